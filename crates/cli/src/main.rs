@@ -1,0 +1,2 @@
+//! The twinray command.
+fn main() {}

@@ -1,0 +1,202 @@
+//! What an author wrote: meshes, instances, materials, textures, cameras, surroundings.
+//!
+//! Plain public data, filled by the readers of `twinray-format` and by `builtin`. Nothing is computed here:
+//! `validate` finds faults, `patch` turns a scene into world-space patches. The solver never sees these types.
+
+use std::sync::Arc;
+
+use glam::DAffine3;
+
+use crate::camera::Camera;
+use crate::rgb::Rgb;
+
+/// A whole scene. Lengths in metres unless the file says otherwise; +Y is up, as in glTF.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Name for messages: the file's stem or the built-in name.
+    pub name: String,
+    /// Triangle meshes, each of one material; they appear only through `instances`.
+    pub meshes: Vec<Mesh>,
+    /// Placed meshes.
+    pub instances: Vec<Instance>,
+    /// Materials, by index from `Mesh::material`.
+    pub materials: Vec<Material>,
+    /// Decoded images, by index from `TextureRef::image`.
+    pub images: Vec<Arc<TextureImage>>,
+    /// Cameras in file order; may be empty.
+    pub cameras: Vec<Camera>,
+    /// Light that comes from infinitely far away; `None` is black.
+    pub environment: Option<Environment>,
+    /// How many patches the scene's author suggests; the command's `--patches` overrides it.
+    pub suggested_patches: Option<usize>,
+}
+
+/// A triangle mesh in its own coordinates.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name for messages.
+    pub name: String,
+    /// Vertex positions `[vertices]`.
+    pub positions: Vec<[f32; 3]>,
+    /// Vertex normals `[vertices]`, used for smooth display only; light is computed with geometric normals.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// First set of texture coordinates `[vertices]`.
+    pub texcoords: Option<Vec<[f32; 2]>>,
+    /// Vertex indices `[triangles][3]`, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into `Scene::materials`.
+    pub material: usize,
+}
+
+/// One placed mesh.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name for messages: the node's or object's.
+    pub name: String,
+    /// Index into `Scene::meshes`.
+    pub mesh: usize,
+    /// Mesh to world. A negative determinant mirrors; the front side follows the mirror, as in glTF.
+    pub transform: DAffine3,
+}
+
+/// How a surface looks. Both sides share it; see `two_sided`.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name for messages.
+    pub name: String,
+    /// Scattering.
+    pub surface: Surface,
+    /// Emitted radiance of the front side (W·sr⁻¹·m⁻², or nit), Lambertian.
+    pub emission: Rgb,
+    /// Multiplies `emission`.
+    pub emission_texture: Option<TextureRef>,
+    /// True: the back scatters light as the front does, with a state of its own. False: the back absorbs.
+    /// Emission is on the front in either case.
+    pub two_sided: bool,
+    /// Where the surface is absent.
+    pub opacity: Opacity,
+    /// True if light passes through (glass). Until materials transmit, such surfaces let rays straight through.
+    pub transmissive: bool,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            surface: Surface::Lambertian { reflectance: Texel::constant(Rgb::grey(0.5)) },
+            emission: Rgb::BLACK,
+            emission_texture: None,
+            two_sided: false,
+            opacity: Opacity::Opaque,
+            transmissive: false,
+        }
+    }
+}
+
+/// A colour that may vary over the surface: `factor` × texture.
+#[derive(Clone, Debug)]
+pub struct Texel {
+    /// Linear factor.
+    pub factor: Rgb,
+    /// Texture of colours, sRGB-encoded, multiplied by the factor.
+    pub texture: Option<TextureRef>,
+}
+
+impl Texel {
+    /// The same colour everywhere.
+    pub fn constant(factor: Rgb) -> Self {
+        Self { factor, texture: None }
+    }
+}
+
+/// Families of scattering.
+#[derive(Clone, Debug)]
+pub enum Surface {
+    /// Perfectly diffuse.
+    Lambertian {
+        /// Reflectance in [0, 1).
+        reflectance: Texel,
+    },
+    /// glTF 2.0 metallic-roughness (appendix B of its specification), GGX lobe over a Lambertian base.
+    MetallicRoughness {
+        /// Diffuse reflectance of the dielectric, F0 of the metal.
+        base_color: Texel,
+        /// Metalness factor in [0, 1].
+        metallic: f64,
+        /// Perceptual roughness factor in [0, 1]; α = roughness².
+        roughness: f64,
+        /// Linear texture: G multiplies roughness, B multiplies metalness.
+        metallic_roughness_texture: Option<TextureRef>,
+        /// `KHR_materials_specular` factor (1 without the extension; 0 is purely Lambertian).
+        specular: f64,
+        /// `KHR_materials_specular` colour factor.
+        specular_color: Rgb,
+        /// Index of refraction (1.5 without `KHR_materials_ior`).
+        ior: f64,
+    },
+    /// Normalised, reciprocal Phong lobe over a Lambertian base (Lafortune and Willems 1994).
+    Phong {
+        /// Diffuse reflectance.
+        diffuse: Texel,
+        /// Reflectance of the lobe at normal incidence.
+        specular: Rgb,
+        /// Phong exponent.
+        exponent: f64,
+    },
+}
+
+/// Where a surface is absent, from the alpha channel of its base colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Opacity {
+    /// Present everywhere; alpha is ignored.
+    #[default]
+    Opaque,
+    /// Present where alpha ≥ the cutoff.
+    Mask {
+        /// Alpha threshold, 0.5 by default in glTF.
+        cutoff: f32,
+    },
+}
+
+/// A use of an image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into `Scene::images`.
+    pub image: usize,
+    /// What happens outside [0, 1], for u and v.
+    pub wrap: [Wrap; 2],
+    /// True: nearest texel; false: bilinear.
+    pub nearest: bool,
+}
+
+/// Texture addressing outside [0, 1].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// Tile.
+    #[default]
+    Repeat,
+    /// Tile, every second copy mirrored.
+    Mirror,
+    /// Repeat the border texel.
+    Clamp,
+}
+
+/// An 8-bit RGBA image `[height, width, 4]`, first row on top (v = 0), not premultiplied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureImage {
+    /// Name for messages.
+    pub name: String,
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width × height × 4` bytes.
+    pub rgba: Vec<u8>,
+}
+
+/// Light from infinitely far away.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Environment {
+    /// The same radiance from every direction.
+    Uniform(Rgb),
+}

@@ -1,0 +1,10 @@
+//! What light meets: colour, geometry, materials, patches, cameras and the built-in scenes.
+pub mod authored;
+pub mod camera;
+pub mod rgb;
+
+pub use authored::{
+    Environment, Instance, Material, Mesh, Opacity, Scene, Surface, Texel, TextureImage, TextureRef, Wrap,
+};
+pub use camera::{Camera, Projection};
+pub use rgb::Rgb;
