@@ -1,0 +1,42 @@
+//! Built-in scenes, drawn in code: rooms with known answers, the Cornell box, two rooms and a door, a hall.
+//!
+//! Not here: files (format) and checks of a scene (`validate`). `by_name` serves the command, the functions with
+//! parameters serve tests. Every closed scene is one-sided and sealed: no light can meet a back face.
+
+mod blocks;
+mod cornell;
+mod cube;
+mod furnace;
+mod mesh;
+mod plates;
+#[cfg(test)]
+mod tests;
+
+pub use cornell::cornell;
+pub use cube::cube;
+pub use furnace::furnace;
+pub use plates::plates;
+
+use crate::authored::Scene;
+
+/// Names and one-line descriptions of the built-in scenes.
+pub const NAMES: &[(&str, &str)] = &[
+    ("furnace", "a room that glows evenly; radiosity is 2 everywhere"),
+    ("plates", "two unit squares face to face, one of them glows; form factor 0.1998"),
+    ("cube", "the unit cube, its floor glows, albedo 0.5"),
+    ("cornell", "the Cornell box, open in front"),
+    ("cornell-closed", "the Cornell box with a white front wall, seen from inside"),
+];
+
+/// The built-in scene called `name`, one of `NAMES`.
+pub fn by_name(name: &str) -> Option<Scene> {
+    let scene = match name {
+        "furnace" => furnace(0.5, 1.0),
+        "plates" => plates(1.0),
+        "cube" => cube(0.5),
+        "cornell" => cornell(false),
+        "cornell-closed" => cornell(true),
+        _ => return None,
+    };
+    Some(scene)
+}

@@ -1,0 +1,11 @@
+//! Numbers for Monte Carlo: counter-based streams, a scrambled Sobol sequence, and warps to directions.
+//!
+//! Everything is a pure function of (seed, index), so that no thread count, batch or resume can change a
+//! result. Not here: what is sampled with them (brdf, solve).
+
+pub mod sobol;
+pub mod stream;
+pub mod warp;
+
+pub use sobol::Sobol;
+pub use stream::Stream;
