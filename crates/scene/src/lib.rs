@@ -2,13 +2,22 @@
 pub mod authored;
 pub mod brdf;
 pub mod builtin;
+mod bvh;
 pub mod camera;
+pub mod cells;
+pub mod complete;
+pub mod environment;
 pub mod geom;
+pub mod patch;
 pub mod rgb;
 pub mod sample;
+pub mod texture;
+pub mod validate;
 
 pub use authored::{
     Environment, Instance, Material, Mesh, Opacity, Scene, Surface, Texel, TextureImage, TextureRef, Wrap,
 };
+pub use bvh::SurfaceHit;
 pub use camera::{Camera, Projection};
+pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
 pub use rgb::Rgb;

@@ -1,0 +1,233 @@
+//! Cells of a triangle by index arithmetic: how one author's triangle becomes many patches of equal area.
+//!
+//! The ray kernel sees the triangle; the solver sees its cells; nothing is stored per cell here. Regular
+//! triangles are cut into m² congruent triangles, slivers into columns × rows along their long side. All places
+//! are barycentric weights (u, v) of vertices 1 and 2. Called by `patch`, by the solver (a random point of a
+//! cell) and by the display (the cell of a hit).
+
+use glam::DVec3;
+
+use crate::sample::warp;
+
+/// Slivers beyond this ratio of longest side to height are cut along their length.
+const SLIVER: f64 = 3.5;
+
+/// The most cells of one triangle: keeps every index within 32 bits.
+const MAX_PER_SIDE: f64 = 30_000.0;
+
+/// How a triangle is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cells {
+    /// m² congruent triangles.
+    Regular {
+        /// Cuts per side.
+        m: u32,
+    },
+    /// Columns of equal area across the longest side, each of `rows` cells of equal area.
+    Strips {
+        /// Columns along the longest side.
+        columns: u32,
+        /// Cells in a column.
+        rows: u32,
+        /// The longest side runs from vertex `first` to the next one.
+        first: u8,
+        /// Where the apex's foot divides the longest side, in [0, 1].
+        foot: f64,
+    },
+}
+
+impl Cells {
+    /// A division of the triangle into cells of about `area` each (square metres; infinite gives one cell).
+    pub fn of_area(vertices: [DVec3; 3], area: f64) -> Self {
+        let triangle = 0.5 * crate::geom::area_vector_2(vertices[0], vertices[1], vertices[2]).length();
+        let wanted = (triangle / area).min(MAX_PER_SIDE * MAX_PER_SIDE);
+        let side = |i: usize| vertices[(i + 1) % 3] - vertices[i];
+        let first = (0..3).max_by(|&a, &b| side(a).length().total_cmp(&side(b).length())).unwrap_or(0);
+        let length = side(first).length();
+        let height = 2.0 * triangle / length;
+        if wanted > 1.5 && length > SLIVER * height {
+            // Cells about as long as high: rows from the mean height, columns from what is left of the budget.
+            let rows = (0.5 * height / area.sqrt()).round().max(1.0);
+            let columns = (wanted / rows).round().clamp(1.0, MAX_PER_SIDE * MAX_PER_SIDE / rows);
+            let apex = vertices[(first + 2) % 3] - vertices[first];
+            let foot = (apex.dot(side(first)) / (length * length)).clamp(0.0, 1.0);
+            return Self::Strips { columns: columns as u32, rows: rows as u32, first: first as u8, foot };
+        }
+        Self::Regular { m: wanted.sqrt().round().clamp(1.0, MAX_PER_SIDE) as u32 }
+    }
+
+    /// Number of cells.
+    pub fn count(&self) -> u32 {
+        match *self {
+            Self::Regular { m } => m * m,
+            Self::Strips { columns, rows, .. } => columns * rows,
+        }
+    }
+
+    /// The cell that holds the point (`u`, `v`); points slightly outside belong to the nearest cell.
+    pub fn locate(&self, u: f64, v: f64) -> u32 {
+        match *self {
+            Self::Regular { m } => {
+                let n = f64::from(m);
+                let (x, y) = (u.max(0.0) * n, v.max(0.0) * n);
+                let j = (y as u32).min(m - 1);
+                let i = (x as u32).min(m - 1 - j);
+                let upper = (x - f64::from(i)) + (y - f64::from(j)) > 1.0 && i + j + 1 < m;
+                row_start(m, j) + 2 * i + u32::from(upper)
+            }
+            Self::Strips { columns, rows, first, foot } => {
+                let weights = [1.0 - u - v, u, v];
+                let (b, c) = (weights[(usize::from(first) + 1) % 3], weights[(usize::from(first) + 2) % 3]);
+                let x = (b + c * foot).clamp(0.0, 1.0);
+                let height = height_at(x, foot);
+                let t = if height > 0.0 { c / height } else { 0.0 };
+                let column = ((area_left_of(x, foot) * f64::from(columns)) as u32).min(columns - 1);
+                let row = ((t.clamp(0.0, 1.0) * f64::from(rows)) as u32).min(rows - 1);
+                column * rows + row
+            }
+        }
+    }
+
+    /// The point of `cell` at (`s`, `t`) in the unit square; uniform by area where (`s`, `t`) is uniform.
+    pub fn point(&self, cell: u32, s: f64, t: f64) -> [f64; 2] {
+        match *self {
+            Self::Regular { m } => {
+                let (i, j, upper) = self.lattice(m, cell);
+                let [a, b] = warp::uniform_triangle([s, t]);
+                let n = f64::from(m);
+                if upper {
+                    [(f64::from(i + 1) - a) / n, (f64::from(j + 1) - b) / n]
+                } else {
+                    [(f64::from(i) + a) / n, (f64::from(j) + b) / n]
+                }
+            }
+            Self::Strips { columns, rows, first, foot } => {
+                let (column, row) = (f64::from(cell / rows), f64::from(cell % rows));
+                let x = position_of_area((column + s) / f64::from(columns), foot);
+                let c = (row + t) / f64::from(rows) * height_at(x, foot);
+                let b = x - c * foot;
+                let mut weights = [0.0; 3];
+                weights[usize::from(first)] = 1.0 - b - c;
+                weights[(usize::from(first) + 1) % 3] = b;
+                weights[(usize::from(first) + 2) % 3] = c;
+                [weights[1], weights[2]]
+            }
+        }
+    }
+
+    /// The centre of `cell`.
+    pub fn centre(&self, cell: u32) -> [f64; 2] {
+        match *self {
+            Self::Regular { m } => {
+                let (i, j, upper) = self.lattice(m, cell);
+                let offset = if upper { 2.0 / 3.0 } else { 1.0 / 3.0 };
+                [(f64::from(i) + offset) / f64::from(m), (f64::from(j) + offset) / f64::from(m)]
+            }
+            Self::Strips { .. } => self.point(cell, 0.5, 0.5),
+        }
+    }
+
+    /// Column, row and orientation of a regular cell.
+    fn lattice(&self, m: u32, cell: u32) -> (u32, u32, bool) {
+        // Row j starts at j (2m − j): solve the quadratic in floating point, then correct its rounding.
+        let rest = f64::from(m) * f64::from(m) - f64::from(cell);
+        let mut j = (f64::from(m) - rest.max(0.0).sqrt()).max(0.0) as u32;
+        while j > 0 && row_start(m, j) > cell {
+            j -= 1;
+        }
+        while j + 1 < m && row_start(m, j + 1) <= cell {
+            j += 1;
+        }
+        let k = cell - row_start(m, j);
+        (k / 2, j, k % 2 == 1)
+    }
+}
+
+/// Index of the first cell of row `j`: rows get shorter by two cells each.
+fn row_start(m: u32, j: u32) -> u32 {
+    j * (2 * m - j)
+}
+
+/// Height of the triangle at `x` along its base, as a share of the apex's height.
+fn height_at(x: f64, foot: f64) -> f64 {
+    if x < foot { x / foot } else { (1.0 - x) / (1.0 - foot).max(f64::MIN_POSITIVE) }.clamp(0.0, 1.0)
+}
+
+/// Share of the area left of `x`.
+fn area_left_of(x: f64, foot: f64) -> f64 {
+    if x < foot { x * x / foot } else { 1.0 - (1.0 - x).powi(2) / (1.0 - foot).max(f64::MIN_POSITIVE) }
+}
+
+/// Inverse of [`area_left_of`].
+fn position_of_area(area: f64, foot: f64) -> f64 {
+    if area < foot { (area * foot).sqrt() } else { 1.0 - ((1.0 - area) * (1.0 - foot)).max(0.0).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::Stream;
+    use twinray_testkit::chi2;
+
+    fn divisions() -> Vec<Cells> {
+        vec![
+            Cells::Regular { m: 1 },
+            Cells::Regular { m: 2 },
+            Cells::Regular { m: 7 },
+            Cells::Strips { columns: 9, rows: 2, first: 0, foot: 0.3 },
+            Cells::Strips { columns: 5, rows: 1, first: 1, foot: 0.0 },
+            Cells::Strips { columns: 6, rows: 3, first: 2, foot: 1.0 },
+        ]
+    }
+
+    #[test]
+    fn a_point_of_a_cell_is_located_in_that_cell() {
+        let mut stream = Stream::new(1, 0, 0);
+        for cells in divisions().into_iter().chain([Cells::Regular { m: 30_000 }]) {
+            for k in 0..500u32 {
+                let cell = (u64::from(k) * 7919 % u64::from(cells.count())) as u32;
+                let [u, v] = cells.point(cell, 0.01 + 0.98 * stream.uniform(), 0.01 + 0.98 * stream.uniform());
+                assert!(u >= 0.0 && v >= 0.0 && u + v <= 1.0 + 1e-12);
+                assert_eq!(cells.locate(u, v), cell, "{cells:?}");
+                let [u, v] = cells.centre(cell);
+                assert_eq!(cells.locate(u, v), cell, "{cells:?}");
+            }
+        }
+    }
+
+    /// Uniform points of the triangle fall equally often into every cell, and points drawn cell by cell are
+    /// uniform on the triangle: the two together say that cells have equal areas and `point` is uniform.
+    #[test]
+    fn cells_have_equal_areas() {
+        let n = 100_000u64;
+        for cells in divisions() {
+            let mut stream = Stream::new(2, 0, 0);
+            let count = cells.count();
+            let mut hits = vec![0u64; count as usize];
+            let mut back = vec![0u64; 64];
+            let grid = Cells::Regular { m: 8 };
+            for k in 0..n {
+                let [u, v] = warp::uniform_triangle([stream.uniform(), stream.uniform()]);
+                hits[cells.locate(u, v) as usize] += 1;
+                let [u, v] = cells.point((k % u64::from(count)) as u32, stream.uniform(), stream.uniform());
+                back[grid.locate(u, v) as usize] += 1;
+            }
+            if count > 1 {
+                let p = chi2::test(&hits, &vec![n as f64 / f64::from(count); count as usize]).p_value;
+                assert!(p > 1e-3, "{cells:?}: {p}");
+            }
+            let p = chi2::test(&back, &[n as f64 / 64.0; 64]).p_value;
+            assert!(p > 1e-3, "{cells:?}: {p}");
+        }
+    }
+
+    #[test]
+    fn slivers_are_cut_along_their_length() {
+        let sliver = [DVec3::ZERO, DVec3::new(10.0, 0.0, 0.0), DVec3::new(5.0, 0.1, 0.0)];
+        let Cells::Strips { columns, rows, .. } = Cells::of_area(sliver, 0.01) else { panic!("a sliver") };
+        assert_eq!((columns, rows), (50, 1));
+        let square = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert_eq!(Cells::of_area(square, 0.5 / 49.0), Cells::Regular { m: 7 });
+        assert_eq!(Cells::of_area(square, f64::INFINITY).count(), 1);
+    }
+}

@@ -1,0 +1,642 @@
+//! Scene to patches: world-space triangles cut into cells, each with its area, normal and material means.
+//!
+//! A [`PatchScene`] is immutable and holds everything that a ray can meet. Coordinates are relative to the
+//! scene's centre, in single precision where the ray kernel reads them: far from the origin f32 has no
+//! millimetres left. A two-sided triangle has two sets of patches back to back, each with its own state.
+//! Not here: the cells' arithmetic (`cells`), rays (`bvh`), light (solve).
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use crate::authored::{Material, Opacity, Scene, Surface, TextureImage, TextureRef};
+use crate::brdf::{Brdf, Ggx, Phong};
+use crate::cells::Cells;
+use crate::environment::EnvironmentLight;
+use crate::geom::area_vector_2;
+use crate::rgb::Rgb;
+use crate::texture::{self, Encoding};
+
+/// How finely a scene is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PatchBudget {
+    /// About so many patches, distributed by area; never fewer than there are triangle sides.
+    Count(usize),
+    /// Cells of about this side, metres; infinite gives one patch per triangle side.
+    Size(f64),
+}
+
+/// Settings of [`PatchScene::new`].
+#[derive(Clone, Copy, Debug)]
+pub struct PatchOptions {
+    /// How finely to cut.
+    pub budget: PatchBudget,
+    /// Treat every material as two-sided.
+    pub two_sided: bool,
+}
+
+impl Default for PatchOptions {
+    fn default() -> Self {
+        Self { budget: PatchBudget::Count(100_000), two_sided: false }
+    }
+}
+
+/// Why a scene cannot be cut into patches.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum PatchError {
+    /// There is no surface at all.
+    #[error("the scene has no triangle with an area; expected at least one: check that the file has meshes, and that its units are not vanishingly small")]
+    Empty,
+    /// More patches than 31 bits can number.
+    #[error("{0} patches are more than the limit of 2147483647: ask for fewer (--patches) or larger ones (--patch-size)")]
+    TooMany(f64),
+    /// A size or a count that is not positive.
+    #[error("a patch size of {0} makes no sense: expected a positive number of metres, or inf")]
+    Size(f64),
+}
+
+/// Index of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PatchId(pub u32);
+
+impl PatchId {
+    /// As an array index.
+    #[inline]
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// One side of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Whence the vertices are counter-clockwise.
+    Front,
+    /// The other.
+    Back,
+}
+
+/// A world-space triangle and the place of its patches.
+#[derive(Clone, Debug)]
+pub(crate) struct Triangle {
+    pub vertices: [[f32; 3]; 3],
+    pub normal: DVec3,
+    pub cells: Cells,
+    pub cell_area: f64,
+    pub first_patch: u32,
+    pub material: u32,
+    pub two_sided: bool,
+    pub metallic: f32,
+    pub roughness: f32,
+}
+
+impl Triangle {
+    #[inline]
+    pub fn vertex(&self, i: usize) -> DVec3 {
+        let [x, y, z] = self.vertices[i];
+        DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+    }
+
+    #[inline]
+    pub fn point(&self, [u, v]: [f64; 2]) -> DVec3 {
+        let a = self.vertex(0);
+        a + (self.vertex(1) - a) * u + (self.vertex(2) - a) * v
+    }
+}
+
+/// Vertex attributes for display, beside the triangles so that the solver's memory stays compact.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Attributes {
+    pub normals: Option<[[f32; 3]; 3]>,
+    pub texcoords: Option<[[f32; 2]; 3]>,
+}
+
+/// Everything a ray can meet, cut into patches.
+#[derive(Debug)]
+pub struct PatchScene {
+    pub(crate) triangles: Vec<Triangle>,
+    pub(crate) attributes: Vec<Attributes>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) images: Vec<Arc<TextureImage>>,
+    pub(crate) kernel: twinray_rays::Bvh,
+    pub(crate) environment: Option<EnvironmentLight>,
+    /// Per patch: triangle × 2 + side.
+    owner: Vec<u32>,
+    /// Per patch: mean base colour.
+    base_color: Vec<[f32; 3]>,
+    /// Per patch: mean emitted radiance; empty if nothing emits.
+    emission: Vec<[f32; 3]>,
+    /// Per patch: share of its cell that is there; empty if no material has holes.
+    coverage: Vec<f32>,
+    centre: DVec3,
+    radius: f64,
+    passed: usize,
+}
+
+impl PatchScene {
+    /// Cuts `scene` into patches and builds its ray kernel.
+    ///
+    /// Transmissive surfaces are left out: light and sight pass straight through them.
+    ///
+    /// # Errors
+    /// If there is no surface, or more patches than can be numbered.
+    ///
+    /// # Panics
+    /// If an index of the scene is out of range: see [`Scene::validate`].
+    pub fn new(scene: &Scene, options: PatchOptions) -> Result<Self, PatchError> {
+        let (centre, radius) = bounds(scene).ok_or(PatchError::Empty)?;
+        let mut triangles = Vec::new();
+        let mut attributes = Vec::new();
+        let mut passed = 0;
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh];
+            let material = &scene.materials[mesh.material];
+            if material.transmissive {
+                passed += mesh.triangles.len();
+                continue;
+            }
+            let place = instance.transform;
+            // Mirrored instances keep their front side outside: the winding follows the determinant (glTF 2.0, 3.5.2).
+            let mirrored = place.matrix3.determinant() < 0.0;
+            let normal_matrix = normal_matrix(place.matrix3);
+            let world: Vec<DVec3> = mesh.positions.iter().map(|p| place.transform_point3(vec(*p)) - centre).collect();
+            for corner in &mesh.triangles {
+                let order = if mirrored { [0, 2, 1] } else { [0, 1, 2] };
+                let corner = order.map(|k| corner[k] as usize);
+                let vertices = corner.map(|k| world[k].as_vec3().to_array());
+                let [a, b, c] = vertices.map(vec);
+                let across = area_vector_2(a, b, c);
+                if !(across.length() > 0.0 && across.is_finite()) {
+                    continue;
+                }
+                triangles.push(Triangle {
+                    vertices,
+                    normal: across.normalize(),
+                    cells: Cells::Regular { m: 1 },
+                    cell_area: 0.5 * across.length(),
+                    first_patch: 0,
+                    material: mesh.material as u32,
+                    two_sided: material.two_sided || options.two_sided,
+                    metallic: 0.0,
+                    roughness: 1.0,
+                });
+                attributes.push(Attributes {
+                    normals: mesh.normals.as_ref().map(|n| {
+                        corner.map(|k| (normal_matrix * vec(n[k])).normalize_or_zero().as_vec3().to_array())
+                    }),
+                    texcoords: mesh.texcoords.as_ref().map(|t| corner.map(|k| t[k])),
+                });
+            }
+        }
+        if triangles.is_empty() {
+            return Err(PatchError::Empty);
+        }
+        divide(&mut triangles, options.budget)?;
+
+        let patches = triangles.last().map_or(0, |t| t.first_patch + sides(t) * t.cells.count()) as usize;
+        let mut owner = Vec::with_capacity(patches);
+        for (index, t) in triangles.iter().enumerate() {
+            for side in 0..sides(t) {
+                owner.extend(std::iter::repeat_n(2 * index as u32 + side, t.cells.count() as usize));
+            }
+        }
+        let kernel_input: Vec<_> = triangles.iter().map(|t| t.vertices).collect();
+        let mut this = Self {
+            triangles,
+            attributes,
+            materials: scene.materials.clone(),
+            images: scene.images.clone(),
+            kernel: twinray_rays::Bvh::build(&kernel_input),
+            environment: scene.environment.clone().map(|e| EnvironmentLight::new(e, radius)),
+            owner,
+            base_color: Vec::new(),
+            emission: Vec::new(),
+            coverage: Vec::new(),
+            centre,
+            radius,
+            passed,
+        };
+        this.average_materials();
+        Ok(this)
+    }
+
+    /// Number of patches, K.
+    pub fn len(&self) -> usize {
+        self.owner.len()
+    }
+
+    /// Never true: a scene without patches is refused.
+    pub fn is_empty(&self) -> bool {
+        self.owner.is_empty()
+    }
+
+    /// Number of triangles that rays can meet.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Number of transmissive triangles that were left out.
+    pub fn transmissive_triangles(&self) -> usize {
+        self.passed
+    }
+
+    /// What to subtract from a world position to get this scene's coordinates.
+    pub fn centre(&self) -> DVec3 {
+        self.centre
+    }
+
+    /// Radius of a sphere around the centre that holds every vertex, metres.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// The surroundings, if they emit.
+    pub fn environment(&self) -> Option<&EnvironmentLight> {
+        self.environment.as_ref()
+    }
+
+    /// All patches.
+    pub fn patches(&self) -> impl ExactSizeIterator<Item = PatchId> + use<> {
+        (0..self.owner.len() as u32).map(PatchId)
+    }
+
+    /// The triangle of a patch.
+    #[inline]
+    pub fn triangle_of(&self, patch: PatchId) -> u32 {
+        self.owner[patch.index()] >> 1
+    }
+
+    /// The side of the triangle on which a patch lies.
+    #[inline]
+    pub fn side_of(&self, patch: PatchId) -> Side {
+        if self.owner[patch.index()] & 1 == 0 { Side::Front } else { Side::Back }
+    }
+
+    /// The cell of its triangle that a patch is.
+    #[inline]
+    pub fn cell_of(&self, patch: PatchId) -> u32 {
+        let owner = self.owner[patch.index()];
+        let t = &self.triangles[(owner >> 1) as usize];
+        patch.0 - t.first_patch - (owner & 1) * t.cells.count()
+    }
+
+    /// The patch at barycentric (`u`, `v`) of one side of a triangle; `None` on the absorbing back of a one-sided one.
+    #[inline]
+    pub fn patch_at(&self, triangle: u32, side: Side, u: f64, v: f64) -> Option<PatchId> {
+        let t = &self.triangles[triangle as usize];
+        let first = match side {
+            Side::Front => t.first_patch,
+            Side::Back if t.two_sided => t.first_patch + t.cells.count(),
+            Side::Back => return None,
+        };
+        Some(PatchId(first + t.cells.locate(u, v)))
+    }
+
+    /// Area, m²; of what is there, where the material has holes.
+    #[inline]
+    pub fn area(&self, patch: PatchId) -> f64 {
+        let area = self.triangles[self.triangle_of(patch) as usize].cell_area;
+        if self.coverage.is_empty() { area } else { area * f64::from(self.coverage[patch.index()]) }
+    }
+
+    /// Outward unit normal, geometric.
+    #[inline]
+    pub fn normal(&self, patch: PatchId) -> DVec3 {
+        let owner = self.owner[patch.index()];
+        let n = self.triangles[(owner >> 1) as usize].normal;
+        if owner & 1 == 0 { n } else { -n }
+    }
+
+    /// Centre of the cell.
+    pub fn cell_centre(&self, patch: PatchId) -> DVec3 {
+        let t = &self.triangles[self.triangle_of(patch) as usize];
+        t.point(t.cells.centre(self.cell_of(patch)))
+    }
+
+    /// Point of the cell at (`s`, `t`) in the unit square, uniform by area.
+    #[inline]
+    pub fn cell_point(&self, patch: PatchId, s: f64, t: f64) -> DVec3 {
+        let triangle = &self.triangles[self.triangle_of(patch) as usize];
+        triangle.point(triangle.cells.point(self.cell_of(patch), s, t))
+    }
+
+    /// A point of the patch that is there: like [`PatchScene::cell_point`], but holes are drawn again with `redraw`.
+    #[inline]
+    pub fn sample_point(&self, patch: PatchId, s: f64, t: f64, mut redraw: impl FnMut() -> f64) -> DVec3 {
+        let index = self.triangle_of(patch);
+        let triangle = &self.triangles[index as usize];
+        let cell = self.cell_of(patch);
+        let mut place = triangle.cells.point(cell, s, t);
+        if !self.coverage.is_empty() {
+            // 64 tries leave fewer than 2 % of the draws outside where a sixteenth of the cell is there.
+            for _ in 0..64 {
+                if self.is_present(index, place[0], place[1]) {
+                    break;
+                }
+                place = triangle.cells.point(cell, redraw(), redraw());
+            }
+        }
+        triangle.point(place)
+    }
+
+    /// Emitted radiance, mean over the patch.
+    #[inline]
+    pub fn emission(&self, patch: PatchId) -> Rgb {
+        if self.emission.is_empty() { Rgb::BLACK } else { Rgb::from_f32(self.emission[patch.index()]) }
+    }
+
+    /// True if any patch emits.
+    pub fn has_emitters(&self) -> bool {
+        !self.emission.is_empty()
+    }
+
+    /// The BRDF of a patch, with its mean base colour.
+    #[inline]
+    pub fn brdf(&self, patch: PatchId) -> Brdf {
+        let color = Rgb::from_f32(self.base_color[patch.index()]);
+        self.brdf_of(self.triangle_of(patch), color)
+    }
+
+    /// The BRDF of a triangle's material with a given base colour.
+    pub fn brdf_of(&self, triangle: u32, color: Rgb) -> Brdf {
+        let t = &self.triangles[triangle as usize];
+        match &self.materials[t.material as usize].surface {
+            Surface::Lambertian { .. } => Brdf::Lambertian { reflectance: color },
+            Surface::MetallicRoughness { specular, specular_color, ior, .. } => Brdf::Ggx(Ggx::new(
+                color,
+                f64::from(t.metallic),
+                f64::from(t.roughness),
+                *specular,
+                *specular_color,
+                *ior,
+            )),
+            Surface::Phong { specular, exponent, .. } => Brdf::Phong(Phong::new(color, *specular, *exponent)),
+        }
+    }
+
+    /// True if the patch has a lobe beside its base.
+    #[inline]
+    pub fn is_glossy(&self, patch: PatchId) -> bool {
+        let t = &self.triangles[self.triangle_of(patch) as usize];
+        !matches!(self.materials[t.material as usize].surface, Surface::Lambertian { .. })
+    }
+
+    /// The material of a patch.
+    pub fn material(&self, patch: PatchId) -> &Material {
+        &self.materials[self.triangles[self.triangle_of(patch) as usize].material as usize]
+    }
+
+    /// Base colour at a point of a triangle, textures at full resolution.
+    pub fn color_at(&self, triangle: u32, u: f64, v: f64) -> Rgb {
+        let material = &self.materials[self.triangles[triangle as usize].material as usize];
+        let texel = base_texel(&material.surface);
+        texel.factor * self.texture_at(texel.texture.as_ref(), triangle, Encoding::Srgb, u, v).0
+    }
+
+    /// Emitted radiance at a point of a triangle's side, textures at full resolution.
+    pub fn emission_at(&self, triangle: u32, side: Side, u: f64, v: f64) -> Rgb {
+        let material = &self.materials[self.triangles[triangle as usize].material as usize];
+        if side == Side::Back || material.emission.is_black() {
+            return Rgb::BLACK;
+        }
+        material.emission * self.texture_at(material.emission_texture.as_ref(), triangle, Encoding::Srgb, u, v).0
+    }
+
+    /// True unless the point lies in a hole of an alpha-masked material.
+    #[inline]
+    pub fn is_present(&self, triangle: u32, u: f64, v: f64) -> bool {
+        let material = &self.materials[self.triangles[triangle as usize].material as usize];
+        let Opacity::Mask { cutoff } = material.opacity else { return true };
+        let texel = base_texel(&material.surface);
+        texel.texture.is_none()
+            || self.texture_at(texel.texture.as_ref(), triangle, Encoding::Srgb, u, v).1 >= f64::from(cutoff)
+    }
+
+    /// Normal for display at a point of a triangle's side: interpolated vertex normals where there are any.
+    pub fn shading_normal(&self, triangle: u32, side: Side, u: f64, v: f64) -> DVec3 {
+        let flat = self.triangles[triangle as usize].normal;
+        let smooth = self.attributes[triangle as usize].normals.map_or(flat, |n| {
+            (vec(n[0]) * (1.0 - u - v) + vec(n[1]) * u + vec(n[2]) * v).normalize_or(flat)
+        });
+        // Authors' normals may point either way on two-sided surfaces; the side decides.
+        let front = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
+        if side == Side::Front { front } else { -front }
+    }
+
+    /// Triangle corners, in this scene's coordinates.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        [0, 1, 2].map(|i| self.triangles[triangle as usize].vertex(i))
+    }
+
+    /// Point of a triangle from barycentric weights.
+    pub fn point_of(&self, triangle: u32, u: f64, v: f64) -> DVec3 {
+        self.triangles[triangle as usize].point([u, v])
+    }
+
+    /// Bytes of the ray kernel and of the patches' constants.
+    pub fn bytes(&self) -> [usize; 2] {
+        let per_triangle = size_of::<Triangle>() + size_of::<Attributes>();
+        let per_patch = 4 + 12 + if self.emission.is_empty() { 0 } else { 12 } + if self.coverage.is_empty() { 0 } else { 4 };
+        [self.kernel.bytes(), self.triangles.len() * per_triangle + self.len() * per_patch]
+    }
+
+    fn texture_at(
+        &self,
+        texture: Option<&TextureRef>,
+        triangle: u32,
+        encoding: Encoding,
+        u: f64,
+        v: f64,
+    ) -> (Rgb, f64) {
+        let (Some(texture), Some(t)) = (texture, self.attributes[triangle as usize].texcoords) else {
+            return (Rgb::WHITE, 1.0);
+        };
+        let at = |k: usize| f64::from(t[0][k]) * (1.0 - u - v) + f64::from(t[1][k]) * u + f64::from(t[2][k]) * v;
+        texture::lookup(&self.images[texture.image], texture, encoding, at(0), at(1))
+    }
+
+    /// Fills the patches' means of textures: colour, emission, coverage; and the triangles' metalness and roughness.
+    fn average_materials(&mut self) {
+        let means: Vec<TriangleMeans> =
+            (0..self.triangles.len() as u32).into_par_iter().map(|i| self.triangle_means(i)).collect();
+        let holes = self.materials.iter().any(|m| m.opacity != Opacity::Opaque);
+        let emits = self.materials.iter().any(|m| !m.emission.is_black());
+        for (t, means) in self.triangles.iter_mut().zip(means) {
+            (t.metallic, t.roughness) = (means.metallic, means.roughness);
+            let count = t.cells.count() as usize;
+            for side in 0..sides(t) {
+                let cell = |values: &[[f32; 3]], k: usize| values[if values.len() == 1 { 0 } else { k }];
+                self.base_color.extend((0..count).map(|k| cell(&means.color, k)));
+                if emits {
+                    let on = side == 0;
+                    self.emission.extend((0..count).map(|k| if on { cell(&means.emission, k) } else { [0.0; 3] }));
+                }
+                if holes {
+                    self.coverage.extend((0..count).map(|k| means.coverage[if means.coverage.len() == 1 { 0 } else { k }]));
+                }
+            }
+        }
+        if self.emission.iter().all(|e| *e == [0.0; 3]) {
+            self.emission = Vec::new();
+        }
+    }
+
+    fn triangle_means(&self, triangle: u32) -> TriangleMeans {
+        let t = &self.triangles[triangle as usize];
+        let material = &self.materials[t.material as usize];
+        let texel = base_texel(&material.surface);
+        let (mut metallic, mut roughness, mut mr_texture) = (0.0, 1.0, None);
+        if let Surface::MetallicRoughness { metallic: m, roughness: r, metallic_roughness_texture, .. } = &material.surface {
+            (metallic, roughness, mr_texture) = (*m, *r, metallic_roughness_texture.as_ref());
+        }
+        let has_uv = self.attributes[triangle as usize].texcoords.is_some();
+        let textured = has_uv && (texel.texture.is_some() || material.emission_texture.is_some());
+        let mut means = TriangleMeans {
+            color: vec![texel.factor.to_f32()],
+            emission: vec![material.emission.to_f32()],
+            coverage: vec![1.0],
+            metallic: metallic as f32,
+            roughness: roughness as f32,
+        };
+        if has_uv && mr_texture.is_some() {
+            let whole = Cells::Regular { m: 1 };
+            let n = self.samples_per_cell(triangle, 1);
+            let at = |[u, v]: [f64; 2]| self.texture_at(mr_texture, triangle, Encoding::Linear, u, v).0;
+            let mean = (0..n).map(|k| at(spread_point(&whole, 0, k))).sum::<Rgb>() / f64::from(n);
+            // glTF: roughness in green, metalness in blue.
+            (means.metallic, means.roughness) = ((metallic * mean.b) as f32, (roughness * mean.g) as f32);
+        }
+        if !textured {
+            return means;
+        }
+        let count = t.cells.count();
+        let n = self.samples_per_cell(triangle, count);
+        let (mut colors, mut emissions, mut coverages) = (Vec::new(), Vec::new(), Vec::new());
+        for cell in 0..count {
+            let (mut color, mut emission, mut present) = (Rgb::BLACK, Rgb::BLACK, 0.0);
+            for k in 0..n {
+                let [u, v] = spread_point(&t.cells, cell, k);
+                if !self.is_present(triangle, u, v) {
+                    continue;
+                }
+                present += 1.0;
+                color += self.color_at(triangle, u, v);
+                emission += self.emission_at(triangle, Side::Front, u, v);
+            }
+            let there = f64::max(present, 1.0);
+            colors.push((color / there).to_f32());
+            emissions.push((emission / there).to_f32());
+            // A ray can still meet what no sample met: half a sample keeps the area positive.
+            coverages.push((f64::max(present, 0.5) / f64::from(n)) as f32);
+        }
+        (means.color, means.emission, means.coverage) = (colors, emissions, coverages);
+        means
+    }
+
+    /// Sample points for a cell's mean: about one per texel, between 4 and 64.
+    fn samples_per_cell(&self, triangle: u32, cells: u32) -> u32 {
+        let Some(t) = self.attributes[triangle as usize].texcoords else { return 1 };
+        let d = |i: usize, k: usize| f64::from(t[i][k] - t[0][k]);
+        let uv_area = 0.5 * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0)).abs();
+        let texels = self.images.iter().map(|i| f64::from(i.width) * f64::from(i.height)).fold(0.0, f64::max);
+        ((uv_area * texels / f64::from(cells)).ceil() as u32).clamp(4, 64)
+    }
+}
+
+/// Point `k` of a cell's additive recurrence (Roberts's R2 sequence): even for any number of points, and on no
+/// lattice line of the cell.
+fn spread_point(cells: &Cells, cell: u32, k: u32) -> [f64; 2] {
+    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
+    let [s, t] = STEP.map(|a| (0.5 + a * f64::from(k)).fract());
+    cells.point(cell, s, t)
+}
+
+struct TriangleMeans {
+    color: Vec<[f32; 3]>,
+    emission: Vec<[f32; 3]>,
+    coverage: Vec<f32>,
+    metallic: f32,
+    roughness: f32,
+}
+
+fn base_texel(surface: &Surface) -> &crate::authored::Texel {
+    match surface {
+        Surface::Lambertian { reflectance } => reflectance,
+        Surface::MetallicRoughness { base_color, .. } => base_color,
+        Surface::Phong { diffuse, .. } => diffuse,
+    }
+}
+
+fn sides(t: &Triangle) -> u32 {
+    1 + u32::from(t.two_sided)
+}
+
+fn vec(p: [f32; 3]) -> DVec3 {
+    DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
+}
+
+/// Normals transform by the inverse transpose; its sign under mirrors is settled by the winding.
+fn normal_matrix(m: DMat3) -> DMat3 {
+    let inverse = m.inverse().transpose();
+    if inverse.is_finite() { inverse } else { m }
+}
+
+/// Centre of the bounding box of all placed vertices, and the largest distance from it.
+fn bounds(scene: &Scene) -> Option<(DVec3, f64)> {
+    let points = || {
+        scene.instances.iter().flat_map(|i| {
+            let mesh = &scene.meshes[i.mesh];
+            mesh.triangles.iter().flatten().map(move |&k| i.transform.transform_point3(vec(mesh.positions[k as usize])))
+        })
+    };
+    let (low, high) = points()
+        .filter(|p| p.is_finite())
+        .fold(None, |b: Option<(DVec3, DVec3)>, p| Some(b.map_or((p, p), |(l, h)| (l.min(p), h.max(p)))))?;
+    let centre = 0.5 * (low + high);
+    let radius = points().filter(|p| p.is_finite()).map(|p| p.distance(centre)).fold(0.0, f64::max);
+    Some((centre, radius))
+}
+
+/// Chooses every triangle's cells and numbers the patches.
+fn divide(triangles: &mut [Triangle], budget: PatchBudget) -> Result<(), PatchError> {
+    let cut = |t: &Triangle, area: f64| Cells::of_area([t.vertex(0), t.vertex(1), t.vertex(2)], area);
+    let count = |area: f64| -> f64 {
+        triangles.par_iter().map(|t| u64::from(cut(t, area).count()) * u64::from(sides(t))).sum::<u64>() as f64
+    };
+    let area = match budget {
+        PatchBudget::Size(size) if size > 0.0 => size * size,
+        PatchBudget::Size(size) => return Err(PatchError::Size(size)),
+        PatchBudget::Count(wish) => {
+            // The number of cells falls with their area: bisection on the logarithm of the area.
+            let wish = wish.max(1) as f64;
+            let total: f64 = triangles.iter().map(|t| t.cell_area * f64::from(sides(t))).sum();
+            let (mut small, mut large) = (total / wish * 1e-3, total * 2.0);
+            let mut best = (f64::INFINITY, large);
+            for _ in 0..32 {
+                let middle = (small * large).sqrt();
+                let n = count(middle);
+                if (n - wish).abs() < best.0 {
+                    best = ((n - wish).abs(), middle);
+                }
+                if n > wish { small = middle } else { large = middle }
+            }
+            best.1
+        }
+    };
+    let total = count(area);
+    if total > f64::from(i32::MAX) {
+        return Err(PatchError::TooMany(total));
+    }
+    let mut next = 0;
+    for t in triangles.iter_mut() {
+        t.cells = cut(t, area);
+        t.cell_area /= f64::from(t.cells.count());
+        t.first_patch = next;
+        next += sides(t) * t.cells.count();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

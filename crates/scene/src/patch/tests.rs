@@ -1,0 +1,119 @@
+//! Patches: areas, places, sides, transforms, budgets, means.
+
+use glam::DAffine3;
+
+use super::*;
+use crate::authored::{Instance, Mesh, Texel, Wrap};
+use crate::builtin;
+
+fn square(transform: DAffine3, two_sided: bool) -> Scene {
+    Scene {
+        meshes: vec![Mesh {
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+            texcoords: Some(vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Mesh::default()
+        }],
+        instances: vec![Instance { name: "square".into(), mesh: 0, transform }],
+        materials: vec![Material { two_sided, ..Material::default() }],
+        ..Scene::default()
+    }
+}
+
+fn patches(scene: &Scene, wish: usize) -> PatchScene {
+    PatchScene::new(scene, PatchOptions { budget: PatchBudget::Count(wish), ..PatchOptions::default() }).unwrap()
+}
+
+#[test]
+fn areas_add_up_and_budgets_are_met() {
+    for (name, _) in builtin::NAMES {
+        let scene = builtin::by_name(name).unwrap();
+        let coarse = PatchScene::new(
+            &scene,
+            PatchOptions { budget: PatchBudget::Size(f64::INFINITY), ..PatchOptions::default() },
+        )
+        .unwrap();
+        assert_eq!(coarse.len(), coarse.triangle_count());
+        let fine = patches(&scene, 50_000);
+        assert!((fine.len() as f64 / 50_000.0 - 1.0).abs() < 0.05, "{name}: {} patches", fine.len());
+        assert!((fine.total_area() / coarse.total_area() - 1.0).abs() < 1e-9);
+        assert!((fine.emitted_power().g - coarse.emitted_power().g).abs() <= 1e-5 * coarse.emitted_power().g);
+    }
+}
+
+#[test]
+fn every_patch_knows_its_place() {
+    for two_sided in [false, true] {
+        let scene = square(DAffine3::IDENTITY, two_sided);
+        let p = patches(&scene, 1000);
+        for patch in p.patches() {
+            let t = p.triangle_of(patch);
+            let cells = p.triangles[t as usize].cells;
+            let [u, v] = cells.centre(p.cell_of(patch));
+            assert_eq!(p.patch_at(t, p.side_of(patch), u, v), Some(patch));
+            let expected = if p.side_of(patch) == Side::Front { 1.0 } else { -1.0 };
+            assert_eq!(p.normal(patch).z, expected);
+        }
+        assert_eq!(p.patch_at(0, Side::Back, 0.2, 0.2).is_some(), two_sided);
+    }
+}
+
+#[test]
+fn a_mirrored_instance_keeps_its_front_outside() {
+    let mirrored = square(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)), false);
+    // A mirror in x leaves the front of a square in the xy plane on +z.
+    assert!(patches(&mirrored, 2).normal(PatchId(0)).z > 0.99);
+    let turned = square(DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)), false);
+    assert!(patches(&turned, 2).normal(PatchId(0)).z < -0.99);
+}
+
+#[test]
+fn rays_meet_the_patch_that_they_are_aimed_at() {
+    let far = DVec3::new(1e5, -2e5, 3e5);
+    for transform in [DAffine3::IDENTITY, DAffine3::from_translation(far)] {
+        let p = patches(&square(transform, false), 200);
+        for patch in p.patches() {
+            let centre = p.cell_centre(patch);
+            let hit = p.trace(centre + DVec3::new(0.0, 0.0, 3.0), DVec3::NEG_Z).expect("a hit");
+            assert_eq!(p.patch_of(&hit), Some(patch));
+            assert!((hit.t - 3.0).abs() < 1e-5);
+            let back = p.trace(centre - DVec3::new(0.0, 0.0, 3.0), DVec3::Z).expect("a hit");
+            assert_eq!((back.side, p.patch_of(&back)), (Side::Back, None));
+        }
+    }
+}
+
+#[test]
+fn textures_are_averaged_and_holes_shrink_patches() {
+    let mut scene = square(DAffine3::IDENTITY, false);
+    // Left half white and opaque, right half black and absent.
+    scene.images = vec![Arc::new(TextureImage {
+        name: "halves".into(),
+        width: 2,
+        height: 1,
+        rgba: vec![255, 255, 255, 255, 0, 0, 0, 0],
+    })];
+    let texture = TextureRef { image: 0, wrap: [Wrap::Clamp; 2], nearest: true };
+    scene.materials[0].surface = Surface::Lambertian {
+        reflectance: Texel { factor: Rgb::grey(0.8), texture: Some(texture) },
+    };
+    let opaque = patches(&scene, 512);
+    let mean = opaque.mean_albedo().g;
+    assert!((mean - 0.4).abs() < 0.01, "{mean}");
+    scene.materials[0].opacity = Opacity::Mask { cutoff: 0.5 };
+    let masked = patches(&scene, 512);
+    assert!((masked.total_area() - 0.5).abs() < 0.02, "{}", masked.total_area());
+    let centre = masked.centre();
+    assert!(masked.trace(DVec3::new(0.75, 0.5, 1.0) - centre, DVec3::NEG_Z).is_none());
+    assert!(masked.trace(DVec3::new(0.25, 0.5, 1.0) - centre, DVec3::NEG_Z).is_some());
+}
+
+#[test]
+fn nothing_to_cut_is_an_error() {
+    assert_eq!(PatchScene::new(&Scene::default(), PatchOptions::default()).unwrap_err(), PatchError::Empty);
+    let size = PatchOptions { budget: PatchBudget::Size(-1.0), ..PatchOptions::default() };
+    assert!(matches!(
+        PatchScene::new(&square(DAffine3::IDENTITY, false), size),
+        Err(PatchError::Size(_))
+    ));
+}

@@ -1,0 +1,108 @@
+//! Texture look-ups: wrap, filter, sRGB decoding.
+//!
+//! Not here: image files (format), averages over patches (`patch`).
+
+use std::sync::OnceLock;
+
+use crate::authored::{TextureImage, TextureRef, Wrap};
+use crate::rgb::Rgb;
+
+/// How the colour channels are encoded; alpha is always linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// IEC 61966-2-1, as glTF has base colour and emission.
+    Srgb,
+    /// Values as they are, as glTF has metalness and roughness.
+    Linear,
+}
+
+/// Decoded sRGB bytes.
+fn srgb_table() -> &'static [f32; 256] {
+    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
+    TABLE.get_or_init(|| std::array::from_fn(|i| srgb_to_linear(i as f64 / 255.0) as f32))
+}
+
+/// The sRGB decoding curve.
+pub fn srgb_to_linear(v: f64) -> f64 {
+    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
+}
+
+/// The sRGB encoding curve.
+pub fn linear_to_srgb(v: f64) -> f64 {
+    if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
+}
+
+/// Colour and alpha at (`u`, `v`); v = 0 is the top row, texel centres at half integers.
+pub fn lookup(image: &TextureImage, texture: &TextureRef, encoding: Encoding, u: f64, v: f64) -> (Rgb, f64) {
+    let (x, y) = (u * f64::from(image.width), v * f64::from(image.height));
+    if texture.nearest {
+        return texel(image, texture, encoding, x.floor(), y.floor());
+    }
+    let (x, y) = (x - 0.5, y - 0.5);
+    let (x0, y0) = (x.floor(), y.floor());
+    let (fx, fy) = (x - x0, y - y0);
+    let at = |dx: f64, dy: f64| texel(image, texture, encoding, x0 + dx, y0 + dy);
+    let mix = |a: (Rgb, f64), b: (Rgb, f64), t: f64| (a.0.lerp(b.0, t), a.1 + (b.1 - a.1) * t);
+    mix(mix(at(0.0, 0.0), at(1.0, 0.0), fx), mix(at(0.0, 1.0), at(1.0, 1.0), fx), fy)
+}
+
+fn texel(image: &TextureImage, texture: &TextureRef, encoding: Encoding, x: f64, y: f64) -> (Rgb, f64) {
+    let column = wrapped(x, image.width, texture.wrap[0]);
+    let row = wrapped(y, image.height, texture.wrap[1]);
+    let start = 4 * (row as usize * image.width as usize + column as usize);
+    let Some(&[r, g, b, a]) = image.rgba.get(start..start + 4) else { return (Rgb::WHITE, 1.0) };
+    let decode = |byte: u8| match encoding {
+        Encoding::Srgb => f64::from(srgb_table()[usize::from(byte)]),
+        Encoding::Linear => f64::from(byte) / 255.0,
+    };
+    (Rgb::new(decode(r), decode(g), decode(b)), f64::from(a) / 255.0)
+}
+
+/// The texel index of `x` (an integer in floating point, any size or sign) in a row of `size`.
+fn wrapped(x: f64, size: u32, wrap: Wrap) -> u32 {
+    let n = f64::from(size.max(1));
+    let i = match wrap {
+        Wrap::Clamp => x,
+        Wrap::Repeat => x.rem_euclid(n),
+        Wrap::Mirror => {
+            let m = x.rem_euclid(2.0 * n);
+            if m < n { m } else { 2.0 * n - 1.0 - m }
+        }
+    };
+    // NaN becomes 0.
+    i.clamp(0.0, n - 1.0) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_texels() -> TextureImage {
+        TextureImage { name: "t".into(), width: 2, height: 1, rgba: vec![0, 0, 0, 255, 255, 255, 255, 0] }
+    }
+
+    fn reference(wrap: Wrap) -> TextureRef {
+        TextureRef { image: 0, wrap: [wrap; 2], nearest: false }
+    }
+
+    #[test]
+    fn bilinear_and_wrapping() {
+        let image = two_texels();
+        let red = |wrap, u| lookup(&image, &reference(wrap), Encoding::Linear, u, 0.5).0.r;
+        assert!((red(Wrap::Clamp, 0.25) - 0.0).abs() < 1e-12);
+        assert!((red(Wrap::Clamp, 0.5) - 0.5).abs() < 1e-12);
+        assert!((red(Wrap::Clamp, 7.0) - 1.0).abs() < 1e-12);
+        assert!((red(Wrap::Repeat, 1.25) - 0.0).abs() < 1e-12);
+        assert!((red(Wrap::Mirror, 1.25) - 1.0).abs() < 1e-12);
+        assert!((lookup(&image, &reference(Wrap::Clamp), Encoding::Srgb, 0.5, 0.5).1 - 0.5).abs() < 1e-12);
+        assert!(red(Wrap::Repeat, f64::NAN).is_finite() || red(Wrap::Repeat, f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn the_srgb_curves_are_inverses() {
+        for i in 0..=255 {
+            let v = f64::from(i) / 255.0;
+            assert!((linear_to_srgb(srgb_to_linear(v)) - v).abs() < 1e-6);
+        }
+    }
+}

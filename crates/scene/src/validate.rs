@@ -1,0 +1,124 @@
+//! Every fault of a scene, in one list: indices that point nowhere, numbers that mean nothing.
+//!
+//! Readers give sound scenes; scenes built by hand go through here before they are cut into patches.
+
+use crate::authored::{Environment, Scene, Surface, Texel, TextureRef};
+use crate::rgb::Rgb;
+
+/// One fault: which element, what is wrong, what was expected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{element}: {problem}")]
+pub struct Fault {
+    /// The element, such as `mesh 3 "chair"`.
+    pub element: String,
+    /// What is wrong with it and what was expected.
+    pub problem: String,
+}
+
+impl Scene {
+    /// All faults; an empty list means that the scene can be cut into patches.
+    pub fn validate(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        let mut fault = |element: String, problem: String| faults.push(Fault { element, problem });
+        for (i, mesh) in self.meshes.iter().enumerate() {
+            let element = || format!("mesh {i} \"{}\"", mesh.name);
+            let n = mesh.positions.len();
+            if mesh.material >= self.materials.len() {
+                fault(element(), format!("material {} of {}", mesh.material, self.materials.len()));
+            }
+            if let Some(k) = mesh.triangles.iter().flatten().find(|&&k| k as usize >= n) {
+                fault(element(), format!("vertex index {k}, expected less than {n}"));
+            }
+            if mesh.positions.iter().flatten().any(|x| !x.is_finite()) {
+                fault(element(), "a vertex position is not finite".into());
+            }
+            if mesh.normals.as_ref().is_some_and(|v| v.len() != n) || mesh.texcoords.as_ref().is_some_and(|v| v.len() != n) {
+                fault(element(), format!("attributes of another length than the {n} positions"));
+            }
+        }
+        for (i, instance) in self.instances.iter().enumerate() {
+            let element = || format!("instance {i} \"{}\"", instance.name);
+            if instance.mesh >= self.meshes.len() {
+                fault(element(), format!("mesh {} of {}", instance.mesh, self.meshes.len()));
+            }
+            if !instance.transform.is_finite() {
+                fault(element(), "its transform is not finite".into());
+            }
+        }
+        for (i, material) in self.materials.iter().enumerate() {
+            let element = || format!("material {i} \"{}\"", material.name);
+            let (colors, textures): (Vec<Rgb>, Vec<&TextureRef>) = match &material.surface {
+                Surface::Lambertian { reflectance } => (vec![reflectance.factor], textures(&[reflectance])),
+                Surface::MetallicRoughness { base_color, metallic_roughness_texture, .. } => {
+                    let mut all = textures(&[base_color]);
+                    all.extend(metallic_roughness_texture);
+                    (vec![base_color.factor], all)
+                }
+                Surface::Phong { diffuse, specular, .. } => {
+                    (vec![diffuse.factor + *specular, diffuse.factor, *specular], textures(&[diffuse]))
+                }
+            };
+            for c in colors {
+                if !c.is_finite() || c.min_channel() < 0.0 || c.max_channel() > 1.0 {
+                    fault(element(), format!("reflectance {:?}, expected 0 to 1", c.to_array()));
+                }
+            }
+            if !material.emission.is_finite() || material.emission.min_channel() < 0.0 {
+                fault(element(), format!("emission {:?}, expected 0 or more", material.emission.to_array()));
+            }
+            for t in textures.into_iter().chain(&material.emission_texture) {
+                if t.image >= self.images.len() {
+                    fault(element(), format!("image {} of {}", t.image, self.images.len()));
+                }
+            }
+        }
+        for (i, image) in self.images.iter().enumerate() {
+            if image.rgba.len() as u64 != 4 * u64::from(image.width) * u64::from(image.height) || image.rgba.is_empty() {
+                fault(format!("image {i} \"{}\"", image.name), "its size does not match its texels".into());
+            }
+        }
+        if let Some(Environment::Uniform(radiance)) = &self.environment
+            && (!radiance.is_finite() || radiance.min_channel() < 0.0)
+        {
+            fault("environment".into(), format!("radiance {:?}, expected 0 or more", radiance.to_array()));
+        }
+        faults
+    }
+}
+
+fn textures<'a>(texels: &[&'a Texel]) -> Vec<&'a TextureRef> {
+    texels.iter().filter_map(|t| t.texture.as_ref()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::authored::{Instance, Material, Mesh};
+    use glam::DAffine3;
+
+    #[test]
+    fn every_fault_is_listed() {
+        let scene = Scene {
+            meshes: vec![Mesh {
+                positions: vec![[0.0; 3], [f32::NAN; 3]],
+                triangles: vec![[0, 1, 2]],
+                material: 7,
+                ..Mesh::default()
+            }],
+            instances: vec![Instance { name: "a".into(), mesh: 3, transform: DAffine3::IDENTITY }],
+            materials: vec![Material { emission: Rgb::grey(-1.0), ..Material::default() }],
+            ..Scene::default()
+        };
+        let faults: Vec<String> = scene.validate().iter().map(|f| f.element.clone()).collect();
+        assert_eq!(faults.iter().filter(|f| f.starts_with("mesh 0")).count(), 3);
+        assert_eq!(faults.iter().filter(|f| f.starts_with("instance 0")).count(), 1);
+        assert_eq!(faults.iter().filter(|f| f.starts_with("material 0")).count(), 1);
+    }
+
+    #[test]
+    fn built_in_scenes_have_no_faults() {
+        for (name, _) in crate::builtin::NAMES {
+            assert_eq!(crate::builtin::by_name(name).expect(name).validate(), [], "{name}");
+        }
+    }
+}
