@@ -527,8 +527,8 @@ impl PatchScene {
             let there = f64::max(present, 1.0);
             colors.push((color / there).to_f32());
             emissions.push((emission / there).to_f32());
-            // A ray can still meet what no sample met: half a sample keeps the area positive.
-            coverages.push((f64::max(present, 0.5) / f64::from(n)) as f32);
+            // A ray can still meet what no sample met: the area must not be zero.
+            coverages.push((present / f64::from(n)).max(1e-3) as f32);
         }
         (means.color, means.emission, means.coverage) = (colors, emissions, coverages);
         means
