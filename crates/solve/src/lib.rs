@@ -1,1 +1,38 @@
-//! solve
+//! Bi-directional rays in global illumination: patches in, solution out.
+//!
+//! The method of Kelemen, Benedek, Szirmay-Kalos and Szécsi (WSCG 2003) and what goes past it. Each ray starts at
+//! a patch chosen by its power and carries light both ways; `docs/paper.md` maps the paper's formulas to this
+//! crate's functions. No file, clock, terminal or window is known here.
+//!
+//! ```
+//! use twinray_scene::{builtin, PatchOptions, PatchScene};
+//! use twinray_solve::{Params, Solver};
+//!
+//! let scene = PatchScene::new(&builtin::cornell(false), PatchOptions::default()).unwrap();
+//! let mut solver = Solver::new(&scene, Params::default_preset(1), None).unwrap();
+//! solver.run(1_000_000);
+//! assert!(solver.solution().balance().residual().abs() < 0.01);
+//! ```
+
+mod fixed;
+mod frozen;
+mod glossy;
+mod iterate;
+mod observer;
+mod params;
+mod patch_radiance;
+mod representative;
+pub mod select;
+mod sequential;
+mod shoot;
+mod solution;
+mod tally;
+pub mod transfer;
+mod wave;
+mod waves;
+
+pub use iterate::Solver;
+pub use observer::Observer;
+pub use params::{Estimator, Params, Representation, Schedule, SolveError};
+pub use solution::{PowerBalance, Solution};
+pub use tally::Tally;

@@ -1,0 +1,183 @@
+//! The state that a wave of rays starts from: every patch's outgoing light, frozen, and the choice among patches.
+//!
+//! Strategies (shares sum to 1): by power, uniformly by area, from the environment. All are one density
+//! λ_i(ω) = power_share · q_i(ω)/P + gather_share/(π A_total) at patches and
+//! λ_env(ω) = environment_share · pdf_line(ω) at the sky, so one formula of the balance heuristic covers them.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use twinray_scene::{PatchId, PatchScene, Rgb};
+
+use crate::glossy::GlossyPatches;
+use crate::patch_radiance::{Directional, Outgoing, stand_in};
+use crate::select::Table;
+use crate::transfer::Endpoint;
+
+/// Wishes for the strategies; what has no power gives its share to the gather.
+#[derive(Clone, Copy, Debug)]
+pub struct Shares {
+    /// Uniformly by area.
+    pub gather: f64,
+    /// From the environment; 0 where it does not shine in this wave.
+    pub environment: f64,
+}
+
+/// What a caller says of one patch.
+#[derive(Clone, Copy, Debug)]
+pub struct Light {
+    /// Emission, W·sr⁻¹·m⁻².
+    pub emitted: Rgb,
+    /// Main part of the reflected radiance, W·sr⁻¹·m⁻².
+    pub main_part: Rgb,
+    /// Directional part of a glossy patch.
+    pub directional: Option<Directional>,
+}
+
+/// A frozen state.
+#[derive(Debug, Default)]
+pub struct Frozen {
+    /// Per patch: E + main part.
+    constant: Vec<[f32; 3]>,
+    /// Per glossy patch.
+    directional: Vec<GlossyLight>,
+    table: Table,
+    /// 𝓛 of the power of all patches' stand-ins, W.
+    power: f64,
+    /// power_share / P.
+    per_power: f64,
+    /// gather_share / (π A_total).
+    gather_density: f64,
+    environment_share: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct GlossyLight {
+    directional: Option<Directional>,
+    cosine_density: f64,
+    lobe_density: f64,
+}
+
+impl Frozen {
+    /// Refills the state. `light` is asked once per patch; `total_area` is that of all patches.
+    pub fn fill(
+        &mut self,
+        scene: &PatchScene,
+        glossy: &GlossyPatches,
+        total_area: f64,
+        shares: Shares,
+        light: impl Fn(PatchId) -> Light,
+    ) {
+        self.constant.clear();
+        self.directional.clear();
+        // First pass: radiance and the stand-in's power of every patch; glossy ones keep (cosine, lobe) for now.
+        let mut power = 0.0;
+        for patch in scene.patches() {
+            let l = light(patch);
+            // Stored in single precision: the stored value is the state, so nothing is inconsistent.
+            let constant = (l.emitted + l.main_part).to_f32();
+            self.constant.push(constant);
+            let mut radiosity = PI * Rgb::from_f32(constant).luminance();
+            if glossy.number_of(patch).is_some() {
+                let n = scene.normal(patch);
+                let parts = l.directional.map(|d| {
+                    let cosine = n.dot(d.wi);
+                    let lobe = d.brdf.lobe_albedo(cosine);
+                    (d.irradiance, lobe, d.brdf.albedo(cosine) - lobe)
+                });
+                let (cosine, lobe) = stand_in(l.emitted, l.main_part, parts);
+                radiosity = PI * cosine + lobe;
+                self.directional.push(GlossyLight {
+                    directional: l.directional,
+                    cosine_density: cosine,
+                    lobe_density: lobe,
+                });
+            }
+            power += radiosity * scene.area(patch);
+        }
+
+        self.power = power;
+        self.environment_share = if scene.environment().is_some() { shares.environment } else { 0.0 };
+        let power_share = if power > 0.0 { 1.0 - self.environment_share - shares.gather } else { 0.0 };
+        let gather_share = 1.0 - self.environment_share - power_share;
+        self.per_power = if power > 0.0 { power_share / power } else { 0.0 };
+        self.gather_density = gather_share / (PI * total_area);
+
+        // Second pass: densities.
+        for g in &mut self.directional {
+            g.cosine_density = g.cosine_density * self.per_power + self.gather_density;
+            g.lobe_density *= self.per_power;
+        }
+        let mut table = std::mem::take(&mut self.table);
+        table.fill(scene.patches().map(|patch| {
+            let out = self.outgoing(glossy, patch);
+            scene.area(patch) * (PI * out.cosine_density + out.lobe_density)
+        }));
+        self.table = table;
+    }
+
+    /// Luminance of the power that all patches send out, W.
+    pub fn power(&self) -> f64 {
+        self.power
+    }
+
+    /// The largest deposit that one ray can leave: radiance over the smallest density beside it.
+    ///
+    /// A channel is at most 1/0.0722 of the luminance; a lobe's radiance may exceed its stand-in by the ratio of
+    /// Fresnel terms, at most about 1/0.02.
+    pub fn largest_deposit(&self, scene: &PatchScene) -> f64 {
+        let channel = 14.0;
+        let lobes = if self.directional.is_empty() { 1.0 } else { 64.0 };
+        let by_power = if self.per_power > 0.0 { channel * lobes / self.per_power } else { 0.0 };
+        let by_sky = match scene.environment() {
+            Some(e) if self.environment_share > 0.0 => channel * e.power().luminance() / self.environment_share,
+            _ => 0.0,
+        };
+        by_power.max(by_sky)
+    }
+
+    /// Outgoing light of a patch.
+    #[inline]
+    pub fn outgoing(&self, glossy: &GlossyPatches, patch: PatchId) -> Outgoing {
+        let constant = Rgb::from_f32(self.constant[patch.index()]);
+        match glossy.number_of(patch) {
+            None => Outgoing {
+                constant,
+                directional: None,
+                cosine_density: self.per_power * constant.luminance() + self.gather_density,
+                lobe_density: 0.0,
+            },
+            Some(k) => {
+                let g = &self.directional[k];
+                Outgoing {
+                    constant,
+                    directional: g.directional,
+                    cosine_density: g.cosine_density,
+                    lobe_density: g.lobe_density,
+                }
+            }
+        }
+    }
+
+    /// What the environment brings to a ray that leaves the scene in `towards`; black if it does not shine now.
+    #[inline]
+    pub fn sky(&self, scene: &PatchScene, towards: DVec3) -> Endpoint {
+        match scene.environment() {
+            Some(e) if self.environment_share > 0.0 => Endpoint {
+                radiance: e.radiance(towards),
+                density: self.environment_share * e.pdf_line(towards),
+            },
+            _ => Endpoint { radiance: Rgb::BLACK, density: 0.0 },
+        }
+    }
+
+    /// Where a ray starts, for uniform `u`: a patch, or `None` for the environment.
+    #[inline]
+    pub fn select(&self, u: f64) -> Option<PatchId> {
+        if u < self.environment_share {
+            return None;
+        }
+        let rest = (u - self.environment_share) / (1.0 - self.environment_share);
+        Some(PatchId(self.table.select(rest.min(1.0 - f64::EPSILON)) as u32))
+    }
+}

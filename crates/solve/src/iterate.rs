@@ -1,0 +1,105 @@
+//! The solver: a scene and settings in, solutions out, a wave or a batch of iterations at a time.
+//!
+//! After [`Solver::new`] succeeds nothing can fail: no file, no clock, no terminal. The caller decides when to
+//! stop; where it stops never changes what a given number of rays gives.
+
+use twinray_scene::PatchScene;
+
+use crate::glossy::GlossyPatches;
+use crate::observer::Observer;
+use crate::params::{Params, Schedule, SolveError};
+use crate::sequential::Sequential;
+use crate::solution::Solution;
+use crate::waves::Waves;
+
+/// Rays of the paper's schedule between two looks at the clock.
+const SEQUENTIAL_STEP: u64 = 1 << 17;
+
+/// A solve in progress.
+#[derive(Debug)]
+pub struct Solver<'a> {
+    scene: &'a PatchScene,
+    params: Params,
+    glossy: GlossyPatches,
+    state: State,
+}
+
+#[derive(Debug)]
+enum State {
+    Sequential(Box<Sequential>, u64),
+    Waves(Box<Waves>),
+}
+
+impl<'a> Solver<'a> {
+    /// Starts a solve; the default schedule's warm start runs here. `observer` is the fixed camera of pictures to
+    /// come, if there is one: it changes nothing but what glossy patches remember for it.
+    ///
+    /// # Errors
+    /// If nothing emits, or a setting is out of range.
+    pub fn new(scene: &'a PatchScene, params: Params, observer: Option<Observer>) -> Result<Self, SolveError> {
+        let fraction = |name, value: f64| match (0.0..1.0).contains(&value) {
+            true => Ok(()),
+            false => Err(SolveError::Setting { name, value, expected: "at least 0 and less than 1" }),
+        };
+        fraction("gather share", params.gather_share)?;
+        fraction("environment share", params.environment_share)?;
+        fraction("sum of the shares", params.gather_share + params.environment_share)?;
+        if !(0.0..=1e6).contains(&params.warm_start) {
+            let expected = "0 to 1000000 rays per patch";
+            return Err(SolveError::Setting { name: "warm start", value: params.warm_start, expected });
+        }
+        let sky = scene.environment().is_some_and(|e| e.power().luminance() > 0.0);
+        if scene.emitted_power().luminance() <= 0.0 && !sky {
+            return Err(SolveError::NoLight);
+        }
+        let glossy = GlossyPatches::new(scene, observer.as_ref());
+        let state = match params.schedule {
+            Schedule::Paper { .. } if sky => return Err(SolveError::PaperEnvironment),
+            Schedule::Paper { batch } => State::Sequential(Box::new(Sequential::new(scene, &glossy)), batch.max(1)),
+            Schedule::Waves => State::Waves(Box::new(Waves::new(scene, &glossy, &params))),
+        };
+        Ok(Self { scene, params, glossy, state })
+    }
+
+    /// Rays so far, n.
+    pub fn rays(&self) -> u64 {
+        match &self.state {
+            State::Sequential(s, _) => s.rays(),
+            State::Waves(w) => w.rays(),
+        }
+    }
+
+    /// One wave, or at most `limit − rays()` iterations of the paper's schedule (whole batches).
+    pub fn advance(&mut self, limit: u64) {
+        match &mut self.state {
+            State::Sequential(s, batch) => {
+                let rays = limit.saturating_sub(s.rays()).clamp(1, SEQUENTIAL_STEP.max(*batch));
+                s.advance(self.scene, &self.glossy, &self.params, rays, *batch);
+            }
+            State::Waves(w) => w.advance(self.scene, &self.glossy, &self.params),
+        }
+    }
+
+    /// Goes on until at least `rays` are shot: waves are whole, so there may be more.
+    pub fn run(&mut self, rays: u64) {
+        while self.rays() < rays {
+            self.advance(rays);
+        }
+    }
+
+    /// Emitted + reflected power as the paper's tree has it at this iteration, W; `None` for waves.
+    pub fn tree_power(&self) -> Option<f64> {
+        match &self.state {
+            State::Sequential(s, _) => Some(s.power()),
+            State::Waves(_) => None,
+        }
+    }
+
+    /// A snapshot of the light. O(K).
+    pub fn solution(&self) -> Solution {
+        match &self.state {
+            State::Sequential(s, _) => s.solution(self.scene, &self.glossy, &self.params),
+            State::Waves(w) => w.solution(self.scene, &self.glossy, &self.params),
+        }
+    }
+}

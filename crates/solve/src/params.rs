@@ -1,0 +1,107 @@
+//! Every knob of the solver, with its default and its place in the paper; the presets.
+
+/// How a ray's two transfers are estimated (paper §1 and §2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estimator {
+    /// Only from the shooter to the hit: L(y)/p(y→x).
+    Forward,
+    /// Only from the hit back to the shooter: L(x)/p(y→x).
+    Backward,
+    /// Both, each with half the weight.
+    Equal,
+    /// Both, each divided by p(y→x) + p(x→y): the balance heuristic of Veach and Guibas.
+    Balance,
+}
+
+/// What a glossy patch remembers of its directional light (paper §2.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Representation {
+    /// The direction-independent main part alone: glossy reflection is lost.
+    Main,
+    /// One accepted (irradiance, direction) sample alone, reflected by the whole BRDF.
+    Sample,
+    /// The main part, and one accepted sample reflected by the difference BRDF.
+    Both,
+    /// As `Both`, but every sample is accepted: the naive baseline, biased.
+    Last,
+}
+
+/// How iterations are grouped and averaged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Schedule {
+    /// The paper's: `batch` rays against one state, every iteration of equal weight (1/n averages), from the
+    /// emission alone. The batch of 1 is the paper itself.
+    Paper {
+        /// Rays per iteration.
+        batch: u64,
+    },
+    /// Warm start by incremental shooting, then growing waves against a frozen state; the state that rays start
+    /// from forgets early waves as n^−q, the output forgets nothing (Polyak-Ruppert averaging).
+    Waves,
+}
+
+/// Settings of a solve. Results depend on these, the scene and nothing else.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Combination of the two transfers.
+    pub estimator: Estimator,
+    /// Directional memory.
+    pub representation: Representation,
+    /// Grouping and averaging.
+    pub schedule: Schedule,
+    /// β, the share of rays that start uniformly by area instead of by power (waves only): 2–3 % more error in
+    /// bright places for a fifth less in dark ones.
+    pub gather_share: f64,
+    /// Share of rays that start from the environment, where there is one (waves only).
+    pub environment_share: f64,
+    /// Rays per patch of the warm start (waves only); 0 starts from the emission alone.
+    pub warm_start: f64,
+}
+
+impl Params {
+    /// Our default: asymptotically unbiased in bright closed rooms, where 1/n averages are not.
+    pub fn default_preset(seed: u64) -> Self {
+        Self {
+            seed,
+            estimator: Estimator::Balance,
+            representation: Representation::Both,
+            schedule: Schedule::Waves,
+            gather_share: 0.1,
+            environment_share: 0.3,
+            warm_start: 4.0,
+        }
+    }
+
+    /// The paper, corrected as `docs/paper.md` explains: one ray per iteration, chosen by power alone.
+    pub fn paper_preset(seed: u64) -> Self {
+        Self {
+            schedule: Schedule::Paper { batch: 1 },
+            gather_share: 0.0,
+            warm_start: 0.0,
+            ..Self::default_preset(seed)
+        }
+    }
+}
+
+/// Why a solver cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Nothing emits, neither a patch nor the environment: every picture is black.
+    #[error("the scene has no light: expected an emitting material or an environment")]
+    NoLight,
+    /// A setting out of its range.
+    #[error("{name} is {value}; expected {expected}")]
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// What it was.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// The paper's schedule knows no environment.
+    #[error("the paper preset selects patches only and cannot shoot from an environment: use the default preset, or light the scene with emitting surfaces")]
+    PaperEnvironment,
+}

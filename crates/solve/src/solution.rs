@@ -1,0 +1,119 @@
+//! A solution: the light of a whole scene after some rays, immutable, independent of any camera.
+//!
+//! Products (pictures, bakes, readings) take it and never touch the solver's state. The main part is a mean and
+//! converges; the representative is one fluctuating sample, whose average over solutions converges.
+
+use glam::DVec3;
+use twinray_scene::{PatchId, PatchScene, Rgb};
+
+use crate::glossy::GlossyPatches;
+use crate::patch_radiance::Directional;
+use crate::tally::Tally;
+
+/// Where the light goes, W (or lumen where radiance is in nit); luminances of powers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PowerBalance {
+    /// Emitted by patches.
+    pub emitted: f64,
+    /// Received from the environment.
+    pub sky: f64,
+    /// Absorbed by patches.
+    pub absorbed: f64,
+    /// Left the scene.
+    pub escaped: f64,
+    /// Met the absorbing backs of one-sided surfaces from within.
+    pub lost: f64,
+}
+
+impl PowerBalance {
+    /// Share of the incoming power that is unaccounted for: 0 when converged.
+    pub fn residual(&self) -> f64 {
+        let incoming = self.emitted + self.sky;
+        (self.absorbed + self.escaped + self.lost - incoming) / incoming
+    }
+
+    /// Share of the incoming power lost on backs.
+    pub fn lost_share(&self) -> f64 {
+        self.lost / (self.emitted + self.sky)
+    }
+}
+
+/// The light of a scene.
+#[derive(Debug)]
+pub struct Solution {
+    pub(crate) rays: u64,
+    pub(crate) irradiance: Vec<[f32; 3]>,
+    pub(crate) glossy: GlossyPatches,
+    pub(crate) glossy_light: Vec<GlossySolution>,
+    pub(crate) balance: PowerBalance,
+    pub(crate) relative_error: f64,
+    pub(crate) tally: Tally,
+}
+
+/// What a glossy patch knows beside its irradiance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GlossySolution {
+    /// Direction-independent main part of the reflected radiance.
+    pub main_part: Rgb,
+    /// The representative, scaled.
+    pub directional: Option<Directional>,
+    /// The lobe's radiance towards the observer, averaged.
+    pub observed_lobe: Option<Rgb>,
+}
+
+impl Solution {
+    /// Rays behind this solution, n.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Incoming irradiance of a patch, W·m⁻² (or lux), mean over its area.
+    #[inline]
+    pub fn irradiance(&self, patch: PatchId) -> Rgb {
+        Rgb::from_f32(self.irradiance[patch.index()])
+    }
+
+    /// Main part of the reflected radiance, W·sr⁻¹·m⁻². Paper: §2.1, L^d.
+    pub fn main_part(&self, scene: &PatchScene, patch: PatchId) -> Rgb {
+        match self.glossy.number_of(patch) {
+            Some(k) => self.glossy_light[k].main_part,
+            None => self.irradiance(patch) * scene.brdf(patch).mean_albedo() / std::f64::consts::PI,
+        }
+    }
+
+    /// Radiance of a patch towards `wo`: emission, main part, and what the stored representative sends there now.
+    pub fn radiance(&self, scene: &PatchScene, patch: PatchId, wo: DVec3) -> Rgb {
+        let constant = scene.emission(patch) + self.main_part(scene, patch);
+        let directional = self.glossy.number_of(patch).and_then(|k| self.glossy_light[k].directional);
+        directional.map_or(constant, |d| {
+            constant + d.irradiance * (d.brdf.eval(scene.normal(patch), d.wi, wo) - d.main_reflectance)
+        })
+    }
+
+    /// Radiance that the lobe of a glossy patch sends to the observer given to the solver, averaged over all
+    /// iterations; `None` for diffuse patches, without an observer, or if the eye is behind the patch.
+    pub fn observed_lobe(&self, patch: PatchId) -> Option<Rgb> {
+        self.glossy.number_of(patch).and_then(|k| self.glossy_light[k].observed_lobe)
+    }
+
+    /// Where the light went.
+    pub fn balance(&self) -> PowerBalance {
+        self.balance
+    }
+
+    /// Estimated relative RMS error of patch irradiance, √(ΣA ΔE²/ΣA E²) of luminance without emitters: the
+    /// transport noise of independent rays. Stratification makes it too large, many bounces too small.
+    pub fn relative_error(&self) -> f64 {
+        self.relative_error
+    }
+
+    /// Deposits that were dropped because they were not finite; 0 unless something is wrong.
+    pub fn invalid_deposits(&self) -> u64 {
+        self.tally.invalid
+    }
+
+    /// Power that arrives on all patches, W: ΣA E.
+    pub fn arriving_power(&self, scene: &PatchScene) -> Rgb {
+        scene.patches().map(|p| self.irradiance(p) * scene.area(p)).sum()
+    }
+}
