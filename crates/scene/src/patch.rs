@@ -314,6 +314,12 @@ impl PatchScene {
         t.point(t.cells.centre(self.cell_of(patch)))
     }
 
+    /// Barycentric weights of vertices 1 and 2 at the centre of the cell.
+    pub fn cell_place(&self, patch: PatchId) -> [f64; 2] {
+        let t = &self.triangles[self.triangle_of(patch) as usize];
+        t.cells.centre(self.cell_of(patch))
+    }
+
     /// Point of the cell at (`s`, `t`) in the unit square, uniform by area.
     #[inline]
     pub fn cell_point(&self, patch: PatchId, s: f64, t: f64) -> DVec3 {

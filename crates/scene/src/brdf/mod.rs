@@ -74,6 +74,11 @@ impl Brdf {
         }
     }
 
+    /// Hemispherical-directional reflectance of the base alone towards the given cosine, under uniform light.
+    pub fn base_reflectance(&self, cosine: f64) -> Rgb {
+        self.albedo(cosine) - self.lobe_albedo(cosine)
+    }
+
     /// True if there is a lobe beside the base.
     pub fn is_glossy(&self) -> bool {
         !matches!(self, Brdf::Lambertian { .. })

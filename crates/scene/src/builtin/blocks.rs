@@ -22,6 +22,12 @@ impl From<usize> for Skin {
 }
 
 impl Skin {
+    /// The same, the face towards +x of `material`.
+    pub(super) fn right(mut self, material: usize) -> Self {
+        self.0[1] = material;
+        self
+    }
+
     /// The same, the upper face of `material`.
     pub(super) fn top(mut self, material: usize) -> Self {
         self.0[3] = material;
@@ -182,8 +188,7 @@ fn grow(mut faces: Vec<Option<Face>>, width: usize, height: usize) -> Vec<Rectan
             let Some(face) = faces[j * width + i] else { continue };
             let same = |&f: &Option<Face>| f == Some(face);
             let columns = faces[j * width + i..(j + 1) * width].iter().take_while(|f| same(f)).count();
-            let rows =
-                (j..height).take_while(|k| faces[k * width + i..][..columns].iter().all(same)).count();
+            let rows = (j..height).take_while(|k| faces[k * width + i..][..columns].iter().all(same)).count();
             for k in j..j + rows {
                 faces[k * width + i..][..columns].fill(None);
             }

@@ -84,13 +84,12 @@ pub fn cornell(closed: bool) -> Scene {
     for (i, material) in [(0, white), (1, red), (2, white), (3, green)] {
         if i > 0 || closed {
             let next = (i + 1) % 4;
-            let wall =
-                [at(FLOOR[i], 0.0), at(FLOOR[next], 0.0), at(CEILING[next], HEIGHT), at(CEILING[i], HEIGHT)];
+            let wall = [at(FLOOR[i], 0.0), at(FLOOR[next], 0.0), at(CEILING[next], HEIGHT), at(CEILING[i], HEIGHT)];
             builder.polygon(material, &wall);
         }
     }
 
-    let (eye_z, vertical_fov_degrees) = if closed { (0.004, 88.0) } else { (-0.8, 39.307_7) };
+    let (eye_z, vertical_fov_degrees) = if closed { (0.004, 94.0) } else { (-0.8, 39.307_7) };
     let eye = DVec3::new(0.278, 0.273, eye_z);
     let camera = Camera::look_at("main", eye, eye + DVec3::Z, DVec3::Y, vertical_fov_degrees);
     builder.finish(vec![Camera { aspect: Some(1.0), ..camera }])

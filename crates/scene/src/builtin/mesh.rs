@@ -38,11 +38,7 @@ pub(super) struct Builder {
 
 impl Builder {
     pub(super) fn new(name: &str) -> Self {
-        Self {
-            scene: Scene { name: name.to_owned(), ..Scene::default() },
-            flat: Vec::new(),
-            smooth: Vec::new(),
-        }
+        Self { scene: Scene { name: name.to_owned(), ..Scene::default() }, flat: Vec::new(), smooth: Vec::new() }
     }
 
     /// Adds a material and returns its index.
@@ -141,19 +137,6 @@ impl Builder {
             }
         }
         self.smooth.push(mesh);
-    }
-
-    /// Adds a horizontal disk (a regular polygon) that faces upwards.
-    pub(super) fn disk(&mut self, material: usize, centre: [f64; 3], radius: f64, sides: usize) {
-        let [x, y, z] = centre;
-        let corners: Vec<[f64; 3]> = (0..sides)
-            .rev()
-            .map(|i| {
-                let [px, pz] = turned_corner(x, z, radius, i, sides);
-                [px, y, pz]
-            })
-            .collect();
-        self.polygon(material, &corners);
     }
 
     /// Adds a horizontal square of half width `half` with a hole for a turned solid of `radius`, facing upwards

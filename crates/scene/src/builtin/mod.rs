@@ -6,7 +6,9 @@
 mod blocks;
 mod cornell;
 mod cube;
+mod doorway;
 mod furnace;
+mod hall;
 mod mesh;
 mod plates;
 #[cfg(test)]
@@ -14,7 +16,9 @@ mod tests;
 
 pub use cornell::cornell;
 pub use cube::cube;
+pub use doorway::doorway;
 pub use furnace::furnace;
+pub use hall::{hall, hall_with};
 pub use plates::plates;
 
 use crate::authored::Scene;
@@ -26,6 +30,9 @@ pub const NAMES: &[(&str, &str)] = &[
     ("cube", "the unit cube, its floor glows, albedo 0.5"),
     ("cornell", "the Cornell box, open in front"),
     ("cornell-closed", "the Cornell box with a white front wall, seen from inside"),
+    ("doorway", "a dark room, lit through a door by the lamp of the next one"),
+    ("hall", "a hall with columns, a gallery, stairs and a polished stone floor"),
+    ("hall-diffuse", "the hall with a matte floor"),
 ];
 
 /// The built-in scene called `name`, one of `NAMES`.
@@ -36,6 +43,9 @@ pub fn by_name(name: &str) -> Option<Scene> {
         "cube" => cube(0.5),
         "cornell" => cornell(false),
         "cornell-closed" => cornell(true),
+        "doorway" => doorway(),
+        "hall" => hall(),
+        "hall-diffuse" => hall_with(false),
         _ => return None,
     };
     Some(scene)

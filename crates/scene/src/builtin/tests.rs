@@ -1,12 +1,12 @@
 //! The built-in scenes are what they claim: sealed, one-sided, nothing covered, lamps of the stated power.
 
-use std::collections::HashSet;
-use std::f64::consts::PI;
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
 use super::{NAMES, by_name, plates};
-use crate::authored::Scene;
+use crate::authored::{Scene, Surface};
 use crate::rgb::Rgb;
 
 /// Scenes that no light leaves, and the volume of air in each, m³, where it is known.
@@ -14,6 +14,8 @@ const CLOSED: &[(&str, Option<f64>)] = &[
     ("furnace", Some(3.0 * 2.4 * 2.0 - 0.8 * 1.2 * 0.6)),
     ("cube", Some(1.0)),
     ("cornell-closed", None),
+    ("doorway", None),
+    ("hall", None),
 ];
 
 fn scene(name: &str) -> Scene {
@@ -28,8 +30,9 @@ fn triangles(scene: &Scene) -> Vec<([DVec3; 3], usize)> {
         .flat_map(|instance| {
             let mesh = &scene.meshes[instance.mesh];
             mesh.triangles.iter().map(move |triangle| {
-                let corner =
-                    |&i: &u32| instance.transform.transform_point3(DVec3::from(mesh.positions[i as usize].map(f64::from)));
+                let corner = |&i: &u32| {
+                    instance.transform.transform_point3(DVec3::from(mesh.positions[i as usize].map(f64::from)))
+                };
                 ([corner(&triangle[0]), corner(&triangle[1]), corner(&triangle[2])], mesh.material)
             })
         })
@@ -79,7 +82,7 @@ impl Numbers {
 
     fn direction(&mut self) -> DVec3 {
         let z = 2.0 * self.next() - 1.0;
-        let (sin, cos) = (std::f64::consts::TAU * self.next()).sin_cos();
+        let (sin, cos) = (TAU * self.next()).sin_cos();
         let r = (1.0 - z * z).sqrt();
         DVec3::new(r * cos, r * sin, z)
     }
@@ -151,11 +154,10 @@ fn closed_scenes_have_no_open_edge() {
         vertices.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
         vertices.dedup();
         let id = |p: DVec3| {
-            vertices.partition_point(|q| {
-                q.x.total_cmp(&p.x).then(q.y.total_cmp(&p.y)).then(q.z.total_cmp(&p.z)).is_lt()
-            })
+            vertices
+                .partition_point(|q| q.x.total_cmp(&p.x).then(q.y.total_cmp(&p.y)).then(q.z.total_cmp(&p.z)).is_lt())
         };
-        let mut balance = std::collections::HashMap::<(usize, usize), i32>::new();
+        let mut balance = HashMap::<(usize, usize), i32>::new();
         for (t, _) in &triangles {
             for i in 0..3 {
                 let (a, b) = (t[i], t[(i + 1) % 3]);
@@ -237,7 +239,7 @@ fn cornell_emits_what_was_measured() {
     }
 }
 
-/// The floor without the boxes' footprints, in mm²: 552.8, 549.6 × 559.2 less 27,2… as the shoelace formula has it.
+/// The floor less both footprints: 252 971.54 mm² by the shoelace formula.
 #[test]
 fn cornell_floor_is_cut_around_the_boxes() {
     let floor: f64 = triangles(&scene("cornell"))
@@ -246,6 +248,37 @@ fn cornell_floor_is_cut_around_the_boxes() {
         .map(|(t, _)| vector_area(*t).y)
         .sum();
     assert!((floor - 0.252_971_54).abs() < 1e-7, "{floor}");
+}
+
+/// The doorway's lamp measures 1.2 × 1.2 m at 2000 nit; the hall is lit as a hall of 288 m² should be, by 200 lx.
+#[test]
+fn lamps_of_the_rooms_are_as_bright_as_said() {
+    let doorway = emitted_power(&scene("doorway")).luminance();
+    assert!((doorway / (PI * 1.44 * 2000.0) - 1.0).abs() < 1e-6, "{doorway} lm");
+    let hall = emitted_power(&scene("hall")).luminance();
+    assert!((40e3..60e3).contains(&hall), "{hall} lm");
+}
+
+/// The checks above leave `hall-diffuse` out, because it differs in its floor's material only.
+#[test]
+fn both_halls_have_the_same_shape() {
+    let (glossy, matte) = (scene("hall"), scene("hall-diffuse"));
+    assert_eq!(triangles(&glossy), triangles(&matte));
+    assert!(matte.materials.iter().all(|material| matches!(material.surface, Surface::Lambertian { .. })));
+    assert!(glossy.materials.iter().any(|material| matches!(material.surface, Surface::MetallicRoughness { .. })));
+}
+
+/// Plausible architecture: no reflectance above 0.85, so that light dies out.
+#[test]
+fn nothing_is_too_white() {
+    for (name, _) in NAMES {
+        for material in scene(name).materials {
+            let (Surface::Lambertian { reflectance: colour }
+            | Surface::MetallicRoughness { base_color: colour, .. }
+            | Surface::Phong { diffuse: colour, .. }) = material.surface;
+            assert!(colour.factor.max_channel() <= 0.85, "{name}: {}", material.name);
+        }
+    }
 }
 
 #[test]

@@ -6,6 +6,8 @@
 //! Points come in blocks of 2³², each scrambled anew; below 2⁻³² a block's points are independent, as full
 //! Owen scrambling would have them, so that dimension 0 has 53 bits for the choice among many patches.
 
+use std::sync::Arc;
+
 use super::stream::{mix, to_unit};
 
 /// Dimensions of the sequence: choice of patch, two for the position, two for the direction.
@@ -16,7 +18,7 @@ pub const DIMENSIONS: usize = 5;
 pub struct Sobol {
     seed: u64,
     /// `tables[dimension][byte of the index][value of the byte]`: four look-ups instead of 32 bit tests.
-    tables: Box<[[[u32; 256]; 4]; DIMENSIONS]>,
+    tables: Arc<[[[u32; 256]; 4]; DIMENSIONS]>,
 }
 
 impl Sobol {
@@ -33,7 +35,12 @@ impl Sobol {
                 }
             }
         }
-        Self { seed, tables }
+        Self { seed, tables: Arc::from(tables) }
+    }
+
+    /// The same sequence, scrambled anew.
+    pub fn rescrambled(&self, seed: u64) -> Self {
+        Self { seed, tables: Arc::clone(&self.tables) }
     }
 
     /// Point `index`, every coordinate in [0, 1).
@@ -133,11 +140,12 @@ mod tests {
     /// Over many seeds one point must be uniform in every pair of dimensions, or the estimates would be biased.
     #[test]
     fn one_point_is_uniform_over_seeds() {
+        let sobol = Sobol::new(0);
         for index in [0, 1, 77, 5_000_000_000] {
             for (a, b) in [(0, 1), (1, 2), (3, 4), (0, 4)] {
                 let mut count = vec![0u64; 256];
                 for seed in 0..20_000 {
-                    let p = Sobol { seed, tables: TABLES.with(|t| t.clone()) }.point(index);
+                    let p = sobol.rescrambled(seed).point(index);
                     count[(p[a] * 16.0) as usize * 16 + (p[b] * 16.0) as usize] += 1;
                 }
                 let p = chi2::test(&count, &vec![20_000.0 / 256.0; 256]).p_value;
@@ -145,9 +153,5 @@ mod tests {
                 assert!(p > 1e-3, "index {index}, dimensions {a}, {b}: p = {p}");
             }
         }
-    }
-
-    thread_local! {
-        static TABLES: Box<[[[u32; 256]; 4]; DIMENSIONS]> = Sobol::new(0).tables;
     }
 }
