@@ -1,2 +1,22 @@
-//! The twinray command.
-fn main() {}
+//! The twinray command: paths, flags, progress, exit codes. Everything else is the `twinray` library's.
+
+mod args;
+mod commands;
+mod failure;
+mod input;
+mod interrupt;
+mod output;
+mod progress;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let outcome = match args::Args::parse().command {
+        args::Command::Render(args) => commands::render::run(&args),
+        args::Command::Info(args) => commands::info::run(&args),
+        args::Command::Scene(args) => commands::scene::run(&args),
+    };
+    failure::exit_code(outcome)
+}

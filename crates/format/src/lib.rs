@@ -1,1 +1,37 @@
-//! format
+//! Bytes to twinray's types and back, for every file kind: glTF 2.0 and OBJ scenes, PNG and EXR pictures.
+//!
+//! Lives here: [`read_scene`] and the writers, one module per file kind, the [`Limits`] hostile bytes run into,
+//! and the two lists a reader answers with, [`FormatError`] and [`Warning`]. Not here: paths and the disk. The
+//! caller hands in bytes and a function that fetches referenced files; what it fetches is checked here first, so
+//! that no file can make a program read outside its own folder. Called by: the command and the viewer.
+//!
+//! ```
+//! use twinray_format::{Limits, read_scene};
+//! let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+//! let mut no_files = |_: &str| Err(std::io::ErrorKind::NotFound.into());
+//! let reading = read_scene("triangle.obj", obj, &mut no_files, &Limits::default()).unwrap();
+//! assert_eq!(reading.scene.meshes[0].triangles.len(), 1);
+//! ```
+
+mod context;
+mod error;
+mod exr;
+mod geometry;
+mod gltf;
+mod limits;
+mod obj;
+mod png;
+mod read;
+mod reference;
+mod reflectance;
+mod texture;
+mod warning;
+
+pub use crate::error::FormatError;
+pub use crate::exr::write_exr;
+pub use crate::gltf::write_glb;
+pub use crate::limits::Limits;
+pub use crate::obj::{ObjFiles, write_obj};
+pub use crate::png::write_png;
+pub use crate::read::{Reading, Resolver, read_scene};
+pub use crate::warning::Warning;

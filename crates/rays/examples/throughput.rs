@@ -11,44 +11,25 @@ use twinray_rays::{Bvh, NO_TRIANGLE, Ray};
 type Triangle = [[f32; 3]; 3];
 
 fn main() {
-    let millions: f64 = std::env::args()
-        .nth(1)
-        .and_then(|a| a.parse().ok())
-        .unwrap_or(2.0);
+    let millions: f64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(2.0);
     let count = (millions * 1e6) as usize;
     let triangles = room();
 
     let (bvh, seconds) = best_of(3, || Bvh::build(&triangles));
     println!("triangles    {}", triangles.len());
-    println!(
-        "build        {:.0} ms on {} threads",
-        seconds * 1e3,
-        rayon::current_num_threads()
-    );
-    println!(
-        "memory       {:.1} B per triangle",
-        bvh.bytes() as f64 / triangles.len() as f64
-    );
+    println!("build        {:.0} ms on {} threads", seconds * 1e3, rayon::current_num_threads());
+    println!("memory       {:.1} B per triangle", bvh.bytes() as f64 / triangles.len() as f64);
 
     let rays = cosine_rays(&triangles, count);
-    let (hits, seconds) = best_of(3, || {
-        rays.iter()
-            .filter(|ray| bvh.closest_hit(ray).is_some())
-            .count()
-    });
+    let (hits, seconds) = best_of(3, || rays.iter().filter(|ray| bvh.closest_hit(ray).is_some()).count());
     println!(
         "closest hit  {:.2} Mray/s, {:.4} of the rays hit",
         count as f64 / seconds / 1e6,
         hits as f64 / count as f64
     );
 
-    let segments: Vec<Ray> = rays
-        .windows(2)
-        .map(|pair| between(&pair[0], &pair[1]))
-        .collect();
-    let (blocked, seconds) = best_of(3, || {
-        segments.iter().filter(|ray| bvh.occluded(ray)).count()
-    });
+    let segments: Vec<Ray> = rays.windows(2).map(|pair| between(&pair[0], &pair[1])).collect();
+    let (blocked, seconds) = best_of(3, || segments.iter().filter(|ray| bvh.occluded(ray)).count());
     println!(
         "occluded     {:.2} Mray/s, {:.4} of the segments blocked",
         count as f64 / seconds / 1e6,
@@ -76,32 +57,14 @@ fn room() -> Vec<Triangle> {
     let mut random = Random(1);
     add_box(&mut out, [0.0; 3], [6.0, 3.0, 4.0], 48, true);
     for _ in 0..15 {
-        let low = [
-            random.unit() * 5.0,
-            random.unit() * 1.5,
-            random.unit() * 3.0,
-        ];
-        let size = [
-            0.3 + random.unit() * 0.6,
-            0.3 + random.unit(),
-            0.3 + random.unit() * 0.6,
-        ];
-        add_box(
-            &mut out,
-            low,
-            [low[0] + size[0], low[1] + size[1], low[2] + size[2]],
-            12,
-            false,
-        );
+        let low = [random.unit() * 5.0, random.unit() * 1.5, random.unit() * 3.0];
+        let size = [0.3 + random.unit() * 0.6, 0.3 + random.unit(), 0.3 + random.unit() * 0.6];
+        add_box(&mut out, low, [low[0] + size[0], low[1] + size[1], low[2] + size[2]], 12, false);
     }
     for _ in 0..12 {
         add_sphere(
             &mut out,
-            [
-                0.5 + random.unit() * 5.0,
-                0.5 + random.unit() * 2.0,
-                0.5 + random.unit() * 3.0,
-            ],
+            [0.5 + random.unit() * 5.0, 0.5 + random.unit() * 2.0, 0.5 + random.unit() * 3.0],
             0.35,
             24,
         );
@@ -128,15 +91,8 @@ fn add_box(out: &mut Vec<Triangle>, low: [f32; 3], high: [f32; 3], n: usize, ins
 
 fn add_sphere(out: &mut Vec<Triangle>, centre: [f32; 3], radius: f32, n: usize) {
     add_grid(out, 2 * n, n, true, |i, j| {
-        let (azimuth, polar) = (
-            i as f32 / (2 * n) as f32 * TAU,
-            j as f32 / n as f32 * TAU / 2.0,
-        );
-        let direction = [
-            polar.sin() * azimuth.cos(),
-            polar.cos(),
-            polar.sin() * azimuth.sin(),
-        ];
+        let (azimuth, polar) = (i as f32 / (2 * n) as f32 * TAU, j as f32 / n as f32 * TAU / 2.0);
+        let direction = [polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin()];
         [0, 1, 2].map(|k| centre[k] + radius * direction[k])
     });
 }
@@ -150,17 +106,8 @@ fn add_grid(
 ) {
     for i in 0..columns {
         for j in 0..rows {
-            let (a, b, c, d) = (
-                point(i, j),
-                point(i + 1, j),
-                point(i + 1, j + 1),
-                point(i, j + 1),
-            );
-            out.extend(if flip {
-                [[a, c, b], [a, d, c]]
-            } else {
-                [[a, b, c], [a, c, d]]
-            });
+            let (a, b, c, d) = (point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1));
+            out.extend(if flip { [[a, c, b], [a, d, c]] } else { [[a, b, c], [a, c, d]] });
         }
     }
 }
@@ -173,15 +120,8 @@ fn cosine_rays(triangles: &[Triangle], count: usize) -> Vec<Ray> {
     while rays.len() < count {
         let id = (random.unit() * triangles.len() as f32) as usize % triangles.len();
         let [a, b, c] = triangles[id];
-        let (e, f) = (
-            [0, 1, 2].map(|k| b[k] - a[k]),
-            [0, 1, 2].map(|k| c[k] - a[k]),
-        );
-        let normal = [
-            e[1] * f[2] - e[2] * f[1],
-            e[2] * f[0] - e[0] * f[2],
-            e[0] * f[1] - e[1] * f[0],
-        ];
+        let (e, f) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+        let normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
         let length = normal.iter().map(|n| n * n).sum::<f32>().sqrt();
         if length == 0.0 {
             continue; // at a pole
@@ -206,12 +146,7 @@ fn cosine_rays(triangles: &[Triangle], count: usize) -> Vec<Ray> {
 
 /// The segment from the start of one ray nearly to the start of another.
 fn between(from: &Ray, to: &Ray) -> Ray {
-    Ray {
-        direction: [0, 1, 2].map(|k| to.origin[k] - from.origin[k]),
-        t_max: 0.9999,
-        skip: NO_TRIANGLE,
-        ..*from
-    }
+    Ray { direction: [0, 1, 2].map(|k| to.origin[k] - from.origin[k]), t_max: 0.9999, skip: NO_TRIANGLE, ..*from }
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014), enough to spread rays.

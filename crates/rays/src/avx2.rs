@@ -36,14 +36,8 @@ impl Lanes for Avx2 {
 fn boxes(node: &Node, ray: &PreparedRay, t_cull: f32) -> (u32, [f32; LANES]) {
     let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(t_cull));
     for axis in 0..3 {
-        let from_near = _mm256_sub_ps(
-            load(&node.planes[ray.near_plane[axis]]),
-            _mm256_set1_ps(ray.near_origin[axis]),
-        );
-        let from_far = _mm256_sub_ps(
-            load(&node.planes[ray.far_plane[axis]]),
-            _mm256_set1_ps(ray.far_origin[axis]),
-        );
+        let from_near = _mm256_sub_ps(load(&node.planes[ray.near_plane[axis]]), _mm256_set1_ps(ray.near_origin[axis]));
+        let from_far = _mm256_sub_ps(load(&node.planes[ray.far_plane[axis]]), _mm256_set1_ps(ray.far_origin[axis]));
         let t_enter = _mm256_mul_ps(from_near, _mm256_set1_ps(ray.near_reciprocal[axis]));
         let t_leave = _mm256_mul_ps(from_far, _mm256_set1_ps(ray.far_reciprocal[axis]));
         // Of a NaN and a number these return the second operand.
@@ -62,34 +56,20 @@ fn triangles(leaf: &Leaf, ray: &PreparedRay) -> u32 {
     let shear = ray.shear.map(|s| _mm256_set1_ps(s));
     let sheared = |vertex: &[[f32; LANES]; 3]| {
         let to_z = _mm256_sub_ps(load(&vertex[z]), origin[2]);
-        let to_x = _mm256_sub_ps(
-            _mm256_sub_ps(load(&vertex[x]), origin[0]),
-            _mm256_mul_ps(shear[0], to_z),
-        );
-        let to_y = _mm256_sub_ps(
-            _mm256_sub_ps(load(&vertex[y]), origin[1]),
-            _mm256_mul_ps(shear[1], to_z),
-        );
+        let to_x = _mm256_sub_ps(_mm256_sub_ps(load(&vertex[x]), origin[0]), _mm256_mul_ps(shear[0], to_z));
+        let to_y = _mm256_sub_ps(_mm256_sub_ps(load(&vertex[y]), origin[1]), _mm256_mul_ps(shear[1], to_z));
         [to_x, to_y]
     };
     let [a, b, c] = &leaf.vertices;
     let (a, b, c) = (sheared(a), sheared(b), sheared(c));
 
-    let edge = |p: [__m256; 2], q: [__m256; 2]| {
-        _mm256_sub_ps(_mm256_mul_ps(p[0], q[1]), _mm256_mul_ps(p[1], q[0]))
-    };
+    let edge = |p: [__m256; 2], q: [__m256; 2]| _mm256_sub_ps(_mm256_mul_ps(p[0], q[1]), _mm256_mul_ps(p[1], q[0]));
     let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
     let zero = _mm256_setzero_ps();
     let not_negative = |e| _mm256_cmp_ps::<_CMP_GE_OQ>(e, zero);
     let not_positive = |e| _mm256_cmp_ps::<_CMP_LE_OQ>(e, zero);
-    let left = _mm256_and_ps(
-        _mm256_and_ps(not_negative(u), not_negative(v)),
-        not_negative(w),
-    );
-    let right = _mm256_and_ps(
-        _mm256_and_ps(not_positive(u), not_positive(v)),
-        not_positive(w),
-    );
+    let left = _mm256_and_ps(_mm256_and_ps(not_negative(u), not_negative(v)), not_negative(w));
+    let right = _mm256_and_ps(_mm256_and_ps(not_positive(u), not_positive(v)), not_positive(w));
     _mm256_movemask_ps(_mm256_or_ps(left, right)) as u32
 }
 

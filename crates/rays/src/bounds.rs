@@ -8,29 +8,14 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    pub const EMPTY: Bounds = Bounds {
-        low: [f32::INFINITY; 3],
-        high: [f32::NEG_INFINITY; 3],
-    };
+    pub const EMPTY: Bounds = Bounds { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
     /// The smallest box around both.
     #[inline(always)]
     pub fn union(&self, other: &Bounds) -> Bounds {
         Bounds {
-            low: std::array::from_fn(|i| {
-                if other.low[i] < self.low[i] {
-                    other.low[i]
-                } else {
-                    self.low[i]
-                }
-            }),
-            high: std::array::from_fn(|i| {
-                if other.high[i] > self.high[i] {
-                    other.high[i]
-                } else {
-                    self.high[i]
-                }
-            }),
+            low: std::array::from_fn(|i| if other.low[i] < self.low[i] { other.low[i] } else { self.low[i] }),
+            high: std::array::from_fn(|i| if other.high[i] > self.high[i] { other.high[i] } else { self.high[i] }),
         }
     }
 
@@ -38,8 +23,7 @@ impl Bounds {
     /// overflow.
     #[inline(always)]
     pub fn half_area(&self) -> f64 {
-        let [x, y, z]: [f64; 3] =
-            std::array::from_fn(|i| f64::from(self.high[i]) - f64::from(self.low[i]));
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|i| f64::from(self.high[i]) - f64::from(self.low[i]));
         if x < 0.0 { 0.0 } else { x * y + y * z + z * x }
     }
 }

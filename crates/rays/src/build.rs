@@ -37,12 +37,7 @@ pub(crate) fn build(triangles: &[[[f32; 3]; 3]]) -> Tree {
         .collect();
     let left_out = triangles.len() - items.len();
     if items.is_empty() {
-        return Tree {
-            nodes: Vec::new(),
-            leaves: Vec::new(),
-            bounds: None,
-            left_out,
-        };
+        return Tree { nodes: Vec::new(), leaves: Vec::new(), bounds: None, left_out };
     }
     let bounds = bounds_of(&items);
     let root = branch(&mut items, 1);
@@ -50,12 +45,7 @@ pub(crate) fn build(triangles: &[[[f32; 3]; 3]]) -> Tree {
     lay_out(&root, triangles, &mut nodes, &mut leaves);
     nodes.shrink_to_fit();
     leaves.shrink_to_fit();
-    Tree {
-        nodes,
-        leaves,
-        bounds: Some([bounds.low, bounds.high]),
-        left_out,
-    }
+    Tree { nodes, leaves, bounds: Some([bounds.low, bounds.high]), left_out }
 }
 
 /// A triangle on its way into the tree.
@@ -67,9 +57,7 @@ struct Item {
 
 impl Item {
     fn new(id: u32, triangle: &[[f32; 3]; 3]) -> Item {
-        let bounds = triangle
-            .iter()
-            .fold(Bounds::EMPTY, |b, v| b.union(&Bounds { low: *v, high: *v }));
+        let bounds = triangle.iter().fold(Bounds::EMPTY, |b, v| b.union(&Bounds { low: *v, high: *v }));
         Item { bounds, id }
     }
 
@@ -81,9 +69,7 @@ impl Item {
 }
 
 fn bounds_of(items: &[Item]) -> Bounds {
-    items
-        .iter()
-        .fold(Bounds::EMPTY, |bounds, item| bounds.union(&item.bounds))
+    items.iter().fold(Bounds::EMPTY, |bounds, item| bounds.union(&item.bounds))
 }
 
 /// A node or leaf before it has a place in the arrays.
@@ -102,16 +88,10 @@ fn branch(items: &mut [Item], depth: usize) -> Subtree {
     let count = items.len();
     let mut ranges = vec![(bounds_of(items), items)];
     while ranges.len() < LANES {
-        let largest = (0..ranges.len())
-            .filter(|&i| ranges[i].1.len() > LANES)
-            .max_by(|&i, &j| {
-                // The first of equals, so that the outcome is plain to reason about.
-                ranges[i]
-                    .0
-                    .half_area()
-                    .total_cmp(&ranges[j].0.half_area())
-                    .then(j.cmp(&i))
-            });
+        let largest = (0..ranges.len()).filter(|&i| ranges[i].1.len() > LANES).max_by(|&i, &j| {
+            // The first of equals, so that the outcome is plain to reason about.
+            ranges[i].0.half_area().total_cmp(&ranges[j].0.half_area()).then(j.cmp(&i))
+        });
         let Some(largest) = largest else { break };
         let (_, items) = ranges.swap_remove(largest);
         let middle = if halve { None } else { partition(items) };
@@ -149,9 +129,7 @@ fn partition(items: &mut [Item]) -> Option<usize> {
     }
     let scale: [f32; 3] = std::array::from_fn(|axis| BINS as f32 / (high[axis] - low[axis]));
     // The cast saturates and takes NaN (no extent) to 0, so any input lands in a bin.
-    let bin = |item: &Item, axis: usize| {
-        (((item.centre(axis) - low[axis]) * scale[axis]) as usize).min(BINS - 1)
-    };
+    let bin = |item: &Item, axis: usize| (((item.centre(axis) - low[axis]) * scale[axis]) as usize).min(BINS - 1);
 
     let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
     for item in items.iter() {
@@ -163,21 +141,13 @@ fn partition(items: &mut [Item]) -> Option<usize> {
     }
 
     let mut best: Option<(f64, usize, usize)> = None;
-    for (axis, bins) in bins
-        .iter()
-        .enumerate()
-        .filter(|&(axis, _)| high[axis] > low[axis])
-    {
+    for (axis, bins) in bins.iter().enumerate().filter(|&(axis, _)| high[axis] > low[axis]) {
         // Costs of everything from a bin on, then of everything before it.
         let mut right = [0.0; BINS];
         let (mut bounds, mut count) = (Bounds::EMPTY, 0);
         for at in (1..BINS).rev() {
             (bounds, count) = (bounds.union(&bins[at].0), count + bins[at].1);
-            right[at] = if count == 0 {
-                f64::INFINITY
-            } else {
-                cost(&bounds, count)
-            };
+            right[at] = if count == 0 { f64::INFINITY } else { cost(&bounds, count) };
         }
         (bounds, count) = (Bounds::EMPTY, 0);
         for at in 1..BINS {
@@ -214,28 +184,15 @@ fn cost(bounds: &Bounds, count: u32) -> f64 {
 fn partition_halves(items: &mut [Item]) -> usize {
     let bounds = bounds_of(items);
     let extent = |axis: &usize| bounds.high[*axis] - bounds.low[*axis];
-    let axis = (0..3)
-        .max_by(|i, j| extent(i).total_cmp(&extent(j)))
-        .unwrap_or(0);
+    let axis = (0..3).max_by(|i, j| extent(i).total_cmp(&extent(j))).unwrap_or(0);
     // A multiple of eight on the left wastes no lane there.
-    let middle = (items.len() / 2)
-        .next_multiple_of(LANES)
-        .min(items.len() - 1);
-    items.select_nth_unstable_by(middle, |a, b| {
-        a.centre(axis)
-            .total_cmp(&b.centre(axis))
-            .then(a.id.cmp(&b.id))
-    });
+    let middle = (items.len() / 2).next_multiple_of(LANES).min(items.len() - 1);
+    items.select_nth_unstable_by(middle, |a, b| a.centre(axis).total_cmp(&b.centre(axis)).then(a.id.cmp(&b.id)));
     middle
 }
 
 /// Appends `subtree` to the arrays, parents before children, and returns where it went.
-fn lay_out(
-    subtree: &Subtree,
-    triangles: &[[[f32; 3]; 3]],
-    nodes: &mut Vec<Node>,
-    leaves: &mut Vec<Leaf>,
-) -> Child {
+fn lay_out(subtree: &Subtree, triangles: &[[[f32; 3]; 3]], nodes: &mut Vec<Node>, leaves: &mut Vec<Leaf>) -> Child {
     match subtree {
         Subtree::Leaf(ids) => {
             let mut leaf = Leaf::empty();

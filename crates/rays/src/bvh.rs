@@ -36,10 +36,7 @@ impl Bvh {
     /// # Panics
     /// If there are more than 2²⁹ triangles.
     pub fn build(triangles: &[[[f32; 3]; 3]]) -> Bvh {
-        assert!(
-            triangles.len() <= Label::MAX_TRIANGLES,
-            "more than 2^29 triangles"
-        );
+        assert!(triangles.len() <= Label::MAX_TRIANGLES, "more than 2^29 triangles");
         let tree = build::build(triangles);
         Bvh {
             nodes: tree.nodes,
@@ -90,9 +87,7 @@ impl Bvh {
 
     /// Memory of the tree in bytes, the triangles in it included.
     pub fn bytes(&self) -> usize {
-        size_of::<Bvh>()
-            + self.nodes.capacity() * size_of::<Node>()
-            + self.leaves.capacity() * size_of::<Leaf>()
+        size_of::<Bvh>() + self.nodes.capacity() * size_of::<Node>() + self.leaves.capacity() * size_of::<Leaf>()
     }
 
     /// Lowest and highest corner of the box around all triangles that can be hit; `None` if there
@@ -112,11 +107,7 @@ impl Bvh {
     }
 
     #[inline(always)]
-    pub(crate) fn closest<L: Lanes>(
-        &self,
-        ray: &PreparedRay,
-        accept: impl Fn(&Hit) -> bool,
-    ) -> Option<Hit> {
+    pub(crate) fn closest<L: Lanes>(&self, ray: &PreparedRay, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
         traverse::closest::<L>(&self.nodes, &self.leaves, ray, accept)
     }
 

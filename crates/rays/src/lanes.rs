@@ -27,25 +27,14 @@ impl Lanes for Portable {
     fn boxes(node: &Node, ray: &PreparedRay, t_cull: f32) -> (u32, [f32; LANES]) {
         let (mut near, mut far) = ([0.0; LANES], [t_cull; LANES]);
         for axis in 0..3 {
-            let (enter, leave) = (
-                &node.planes[ray.near_plane[axis]],
-                &node.planes[ray.far_plane[axis]],
-            );
+            let (enter, leave) = (&node.planes[ray.near_plane[axis]], &node.planes[ray.far_plane[axis]]);
             for lane in 0..LANES {
                 let t_enter = (enter[lane] - ray.near_origin[axis]) * ray.near_reciprocal[axis];
                 let t_leave = (leave[lane] - ray.far_origin[axis]) * ray.far_reciprocal[axis];
                 // 0·inf, a parallel ray in the plane, is NaN, and must not narrow the interval:
                 // hence these comparisons, this way round.
-                near[lane] = if t_enter > near[lane] {
-                    t_enter
-                } else {
-                    near[lane]
-                };
-                far[lane] = if t_leave < far[lane] {
-                    t_leave
-                } else {
-                    far[lane]
-                };
+                near[lane] = if t_enter > near[lane] { t_enter } else { near[lane] };
+                far[lane] = if t_leave < far[lane] { t_leave } else { far[lane] };
             }
         }
         let mut mask = 0;
@@ -73,8 +62,7 @@ impl Lanes for Portable {
             let u = c[0] * b[1] - c[1] * b[0];
             let v = a[0] * c[1] - a[1] * c[0];
             let w = b[0] * a[1] - b[1] * a[0];
-            let inside =
-                ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
+            let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
             mask |= u32::from(inside) << lane;
         }
         mask

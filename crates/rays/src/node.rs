@@ -20,10 +20,7 @@ pub(crate) struct Node {
 impl Node {
     pub fn empty() -> Node {
         let (low, high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-        Node {
-            planes: [low, low, low, high, high, high],
-            children: [Child(0); LANES],
-        }
+        Node { planes: [low, low, low, high, high, high], children: [Child(0); LANES] }
     }
 }
 
@@ -67,10 +64,7 @@ pub(crate) struct Leaf {
 
 impl Leaf {
     pub fn empty() -> Leaf {
-        Leaf {
-            vertices: [[[f32::NAN; LANES]; 3]; 3],
-            labels: [Label(0); LANES],
-        }
+        Leaf { vertices: [[[f32::NAN; LANES]; 3]; 3], labels: [Label(0); LANES] }
     }
 
     pub fn set(&mut self, lane: usize, vertices: &[[f32; 3]; 3], label: Label) {

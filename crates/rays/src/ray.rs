@@ -42,12 +42,7 @@ pub struct Ray {
 impl Ray {
     /// The unbounded ray that ignores no triangle.
     pub fn new(origin: [f32; 3], direction: [f32; 3]) -> Ray {
-        Ray {
-            origin,
-            direction,
-            t_max: f32::INFINITY,
-            skip: NO_TRIANGLE,
-        }
+        Ray { origin, direction, t_max: f32::INFINITY, skip: NO_TRIANGLE }
     }
 }
 
@@ -128,8 +123,8 @@ impl PreparedRay {
             2
         };
         // Every comparison is written so that NaN fails it.
-        let direction_ok = magnitude.iter().all(|&m| m <= *DIRECTION_RANGE.end())
-            && magnitude[z] >= *DIRECTION_RANGE.start();
+        let direction_ok =
+            magnitude.iter().all(|&m| m <= *DIRECTION_RANGE.end()) && magnitude[z] >= *DIRECTION_RANGE.start();
         let origin_ok = ray.origin.iter().all(|o| o.abs() <= MAX_COORDINATE);
         let t_max_ok = ray.t_max > 0.0;
         if !(direction_ok && origin_ok && t_max_ok) {
@@ -138,19 +133,14 @@ impl PreparedRay {
 
         let axes = [NEXT[z], NEXT[NEXT[z]], z];
         let extent = |axis: usize| {
-            let (below, above) = (
-                (ray.origin[axis] - bounds[0][axis]).abs(),
-                (ray.origin[axis] - bounds[1][axis]).abs(),
-            );
+            let (below, above) =
+                ((ray.origin[axis] - bounds[0][axis]).abs(), (ray.origin[axis] - bounds[1][axis]).abs());
             if below > above { below } else { above }
         };
         let mut prepared = PreparedRay {
             origin: ray.origin,
             axes,
-            shear: [
-                ray.direction[axes[0]] / ray.direction[z],
-                ray.direction[axes[1]] / ray.direction[z],
-            ],
+            shear: [ray.direction[axes[0]] / ray.direction[z], ray.direction[axes[1]] / ray.direction[z]],
             direction_z: ray.direction[z],
             near_plane: [0; 3],
             far_plane: [0; 3],
@@ -169,11 +159,7 @@ impl PreparedRay {
             let (below, above) = ((origin - padding).next_down(), (origin + padding).next_up());
             // Of a parallel ray either plane may be the near one; both signs of zero must agree
             // with the choice made here.
-            let reciprocal = if direction == 0.0 {
-                f32::INFINITY
-            } else {
-                1.0 / direction
-            };
+            let reciprocal = if direction == 0.0 { f32::INFINITY } else { 1.0 / direction };
             if direction < 0.0 {
                 (prepared.near_plane[axis], prepared.far_plane[axis]) = (axis + 3, axis);
                 (prepared.near_origin[axis], prepared.far_origin[axis]) = (below, above);

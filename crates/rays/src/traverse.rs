@@ -52,12 +52,7 @@ const STOP: f32 = -1.0;
 /// `visit` returned. Near boxes come first, and boxes that begin exactly at the limit are still
 /// opened, because ties are decided by `visit`.
 #[inline(always)]
-fn walk<L: Lanes>(
-    nodes: &[Node],
-    leaves: &[Leaf],
-    ray: &PreparedRay,
-    mut visit: impl FnMut(Hit) -> f32,
-) {
+fn walk<L: Lanes>(nodes: &[Node], leaves: &[Leaf], ray: &PreparedRay, mut visit: impl FnMut(Hit) -> f32) {
     let mut limit = ray.t_max;
     let mut stack = [const { MaybeUninit::<Waiting>::uninit() }; STACK];
     stack[0] = MaybeUninit::new(Waiting::new(0.0, Child::node(0)));

@@ -12,14 +12,7 @@ use crate::ray::{Hit, MAX_COORDINATE, PreparedRay};
 
 /// Orders of stored vertices: entry `[o][i]` is the author's index of stored vertex `i`. The first
 /// three are rotations (even), the last three change the winding.
-pub(crate) const ORDERS: [[usize; 3]; 6] = [
-    [0, 1, 2],
-    [1, 2, 0],
-    [2, 0, 1],
-    [0, 2, 1],
-    [2, 1, 0],
-    [1, 0, 2],
-];
+pub(crate) const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
 /// First odd entry of [`ORDERS`].
 const FIRST_ODD: usize = 3;
@@ -31,10 +24,7 @@ pub(crate) fn can_be_hit(triangle: &[[f32; 3]; 3]) -> bool {
         return false;
     }
     let [a, b, c] = triangle.map(|v| v.map(f64::from));
-    let (e, f) = (
-        [b[0] - a[0], b[1] - a[1], b[2] - a[2]],
-        [c[0] - a[0], c[1] - a[1], c[2] - a[2]],
-    );
+    let (e, f) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
     e[1] * f[2] != e[2] * f[1] || e[2] * f[0] != e[0] * f[2] || e[0] * f[1] != e[1] * f[0]
 }
 
@@ -46,13 +36,9 @@ pub(crate) fn can_be_hit(triangle: &[[f32; 3]; 3]) -> bool {
 /// because the two compare equal.
 pub(crate) fn canonical(triangle: &[[f32; 3]; 3]) -> ([[f32; 3]; 3], usize) {
     let vertices = triangle.map(|v| v.map(|c| c + 0.0));
-    let sorted = |order: &[usize; 3]| {
-        vertices[order[0]] <= vertices[order[1]] && vertices[order[1]] <= vertices[order[2]]
-    };
-    let order = ORDERS
-        .iter()
-        .position(sorted)
-        .expect("finite vertices have an order");
+    let sorted =
+        |order: &[usize; 3]| vertices[order[0]] <= vertices[order[1]] && vertices[order[1]] <= vertices[order[2]];
+    let order = ORDERS.iter().position(sorted).expect("finite vertices have an order");
     (ORDERS[order].map(|i| vertices[i]), order)
 }
 
@@ -73,15 +59,8 @@ pub(crate) fn meet(leaf: &Leaf, lane: usize, ray: &PreparedRay, t_limit: f32) ->
 
     // Edge functions: products of two f32 are exact in f64, so only the difference rounds, and
     // rounding keeps its sign. Zero counts as inside for both neighbours of an edge.
-    let weights = [
-        c[0] * b[1] - c[1] * b[0],
-        a[0] * c[1] - a[1] * c[0],
-        b[0] * a[1] - b[1] * a[0],
-    ];
-    let (negative, positive) = (
-        weights.iter().any(|w| *w < 0.0),
-        weights.iter().any(|w| *w > 0.0),
-    );
+    let weights = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
+    let (negative, positive) = (weights.iter().any(|w| *w < 0.0), weights.iter().any(|w| *w > 0.0));
     if negative == positive {
         return None; // outside, or seen edge-on
     }

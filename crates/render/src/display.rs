@@ -8,7 +8,6 @@ use glam::{DMat3, DVec3};
 use twinray_scene::Rgb;
 use twinray_scene::texture::linear_to_srgb;
 
-use crate::image::Image;
 use crate::picture::Picture;
 
 /// How radiance is scaled before the tone curve.
@@ -43,13 +42,19 @@ impl Exposure {
     }
 }
 
+/// Scaled luminance to which lights are limited before they mix with their neighbours within a pixel: white in
+/// every curve, and no more, so that the edge of a lamp is as smooth as any other.
+const BRIGHTEST_LIGHT: f64 = 12.0;
+
 /// sRGB bytes `[height, width, 3]` of a picture.
-pub fn to_srgb8(image: &Image, exposure: f64, curve: ToneCurve) -> Vec<u8> {
-    image
-        .pixels
-        .iter()
-        .flat_map(|p| {
-            let scaled = Rgb::from_f32(*p) * exposure;
+pub fn to_srgb8(picture: &Picture, exposure: f64, curve: ToneCurve) -> Vec<u8> {
+    let pixels = picture.image.pixels.iter().zip(&picture.lights);
+    pixels
+        .flat_map(|(pixel, (lights, covered))| {
+            let lights = Rgb::from_f32(*lights) * exposure;
+            let limit = BRIGHTEST_LIGHT * f64::from(*covered);
+            let excess = (1.0 - limit / lights.max_channel().max(1e-300)).max(0.0);
+            let scaled = Rgb::from_f32(*pixel) * exposure - lights * excess;
             let shown = match curve {
                 ToneCurve::AgX => agx(scaled),
                 ToneCurve::None => scaled.map(|c| linear_to_srgb(c.clamp(0.0, 1.0))),
@@ -63,9 +68,15 @@ pub fn to_srgb8(image: &Image, exposure: f64, curve: ToneCurve) -> Vec<u8> {
 fn agx(c: Rgb) -> Rgb {
     // Mixing the primaries a little first is what lets saturated lights fade to white.
     const INSET: DMat3 = DMat3::from_cols_array(&[
-        0.842479062253094, 0.0423282422610123, 0.0423756549057051, //
-        0.0784335999999992, 0.878468636469772, 0.0784336, //
-        0.0792237451477643, 0.0791661274605434, 0.879142973793104,
+        0.842479062253094,
+        0.0423282422610123,
+        0.0423756549057051, //
+        0.0784335999999992,
+        0.878468636469772,
+        0.0784336, //
+        0.0792237451477643,
+        0.0791661274605434,
+        0.879142973793104,
     ]);
     const STOPS: [f64; 2] = [-12.47393, 4.026069];
     let v = INSET * DVec3::from_array(c.map(|x| x.max(0.0)).to_array());

@@ -35,9 +35,6 @@ impl Grid {
         let high = ((point + radius) / self.edge).floor().as_ivec3();
         let cubes = (low.x..=high.x)
             .flat_map(move |x| (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| IVec3::new(x, y, z))));
-        cubes
-            .filter_map(|c| self.cubes.get(&c))
-            .flat_map(|&(a, b)| &self.patches[a as usize..b as usize])
-            .copied()
+        cubes.filter_map(|c| self.cubes.get(&c)).flat_map(|&(a, b)| &self.patches[a as usize..b as usize]).copied()
     }
 }

@@ -39,6 +39,10 @@ impl Default for PictureOptions {
 pub struct Picture {
     /// Linear radiance.
     pub image: Image,
+    /// Per pixel: the part of the radiance that comes straight from emitters and surroundings, and the share of the
+    /// pixel that they cover. Displays clip these lights before they mix them with what is beside them, or their
+    /// edges would be jagged.
+    pub lights: Vec<([f32; 3], f32)>,
     /// Mean of log₂ luminance over camera rays that met a lit surface without emission; `None` if none did.
     pub log2_luminance: Option<f64>,
     /// Share of camera rays that met nothing.
@@ -52,34 +56,44 @@ const MOST_BACKS: u32 = 16;
 pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options: &PictureOptions) -> Picture {
     let reconstruction = Reconstruction::new(scene, solution);
     let aspect = f64::from(options.width) / f64::from(options.height);
-    let rows: Vec<(Vec<[f32; 3]>, Light)> = (0..options.height)
+    let rows: Vec<(Vec<Pixel>, Light)> = (0..options.height)
         .into_par_iter()
         .map(|y| {
             let mut light = Light::default();
             let row = (0..options.width)
                 .map(|x| {
-                    let mut sum = Rgb::BLACK;
+                    let (mut sum, mut lights, mut covered) = (Rgb::BLACK, Rgb::BLACK, 0.0);
                     for k in 0..options.samples {
                         let [dx, dy] = film_offset(options, x, y, k);
                         let (px, py) = (f64::from(x) + dx, f64::from(y) + dy);
                         let (origin, direction) =
                             camera.ray(px / f64::from(options.width), py / f64::from(options.height), aspect);
-                        sum += seen(scene, &reconstruction, options, origin - scene.centre(), direction, &mut light);
+                        let (reflected, direct) =
+                            seen(scene, &reconstruction, options, origin - scene.centre(), direction, &mut light);
+                        sum += reflected + direct;
+                        lights += direct;
+                        covered += if direct.is_black() { 0.0 } else { 1.0 };
                     }
-                    (sum / f64::from(options.samples)).to_f32()
+                    let n = f64::from(options.samples);
+                    ((sum / n).to_f32(), ((lights / n).to_f32(), (covered / n) as f32))
                 })
                 .collect();
             (row, light)
         })
         .collect();
     let mut total = Light::default();
-    let mut pixels = Vec::with_capacity(options.width as usize * options.height as usize);
+    let count = options.width as usize * options.height as usize;
+    let (mut pixels, mut lights) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for (row, light) in rows {
-        pixels.extend(row);
+        for (pixel, direct) in row {
+            pixels.push(pixel);
+            lights.push(direct);
+        }
         total.add(&light);
     }
     Picture {
         image: Image { width: options.width, height: options.height, pixels },
+        lights,
         log2_luminance: (total.lit > 0).then(|| total.log2_sum / total.lit as f64),
         empty: total.empty as f64 / total.rays.max(1) as f64,
     }
@@ -94,6 +108,9 @@ fn film_offset(options: &PictureOptions, x: u32, y: u32, k: u32) -> [f64; 2] {
     let u = [place(0.754_877_666_246_692_7, jitter.uniform()), place(0.569_840_290_998_053_3, jitter.uniform())];
     u.map(|u| 0.5 + if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() })
 }
+
+/// Radiance, and of it the lights' part with their coverage.
+type Pixel = ([f32; 3], ([f32; 3], f32));
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Light {
@@ -112,6 +129,7 @@ impl Light {
     }
 }
 
+/// Reflected and directly emitted radiance of what a camera ray meets.
 fn seen(
     scene: &PatchScene,
     reconstruction: &Reconstruction,
@@ -119,11 +137,11 @@ fn seen(
     origin: DVec3,
     direction: DVec3,
     light: &mut Light,
-) -> Rgb {
+) -> (Rgb, Rgb) {
     light.rays += 1;
     let Some((hit, patch)) = first_side(scene, origin, direction) else {
         light.empty += 1;
-        return scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction));
+        return (Rgb::BLACK, scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction)));
     };
     let smooth = if options.flat { reconstruction.flat(patch) } else { reconstruction.smooth(patch, &hit) };
     let brdf = scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v));
@@ -135,7 +153,7 @@ fn seen(
         light.lit += 1;
         light.log2_sum += libm::log2(reflected.luminance());
     }
-    emitted + reflected
+    (reflected, emitted)
 }
 
 /// The first side that scatters: one-sided surfaces are not seen from behind, as glTF has it.

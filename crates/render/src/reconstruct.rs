@@ -61,7 +61,8 @@ pub struct Reconstruction<'a> {
 impl<'a> Reconstruction<'a> {
     /// Prepares the search for neighbours. O(K log K).
     pub fn new(scene: &'a PatchScene, solution: &'a Solution) -> Self {
-        let centres: Vec<DVec3> = (0..scene.len() as u32).into_par_iter().map(|p| scene.cell_centre(PatchId(p))).collect();
+        let centres: Vec<DVec3> =
+            (0..scene.len() as u32).into_par_iter().map(|p| scene.cell_centre(PatchId(p))).collect();
         let typical_size = (scene.total_area() / scene.len() as f64).sqrt();
         Self {
             scene,
@@ -181,11 +182,12 @@ impl<'a> Reconstruction<'a> {
             let (n, touching) = (scene.normal(patch), 0.02 * self.typical_size);
             let mut free = 0;
             for k in 0..COVER_TESTS {
-                let (s, t) = ((f64::from(k) * 0.754_877_666 + 0.5).fract(), (f64::from(k) * 0.569_840_29 + 0.5).fract());
+                let (s, t) =
+                    ((f64::from(k) * 0.754_877_666 + 0.5).fract(), (f64::from(k) * 0.569_840_29 + 0.5).fract());
                 let point = scene.cell_point(patch, s, t);
-                let covered = scene.trace_from(patch, point, n).is_some_and(|hit| {
-                    hit.t < touching || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
-                });
+                let covered = scene
+                    .trace_from(patch, point, n)
+                    .is_some_and(|hit| hit.t < touching || (hit.side == Side::Back && scene.patch_of(&hit).is_none()));
                 free += u32::from(!covered);
             }
             f64::from(free) / f64::from(COVER_TESTS)

@@ -83,12 +83,7 @@ impl PatchScene {
 }
 
 fn kernel_ray(origin: DVec3, direction: DVec3, skip: u32) -> Ray {
-    Ray {
-        origin: origin.as_vec3().to_array(),
-        direction: direction.as_vec3().to_array(),
-        t_max: f32::INFINITY,
-        skip,
-    }
+    Ray { origin: origin.as_vec3().to_array(), direction: direction.as_vec3().to_array(), t_max: f32::INFINITY, skip }
 }
 
 /// A point moved off its surface by a few units in the last place of single precision, in which the kernel

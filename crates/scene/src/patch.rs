@@ -46,10 +46,14 @@ impl Default for PatchOptions {
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
 pub enum PatchError {
     /// There is no surface at all.
-    #[error("the scene has no triangle with an area; expected at least one: check that the file has meshes, and that its units are not vanishingly small")]
+    #[error(
+        "the scene has no triangle with an area; expected at least one: check that the file has meshes, and that its units are not vanishingly small"
+    )]
     Empty,
     /// More patches than 31 bits can number.
-    #[error("{0} patches are more than the limit of 2147483647: ask for fewer (--patches) or larger ones (--patch-size)")]
+    #[error(
+        "{0} patches are more than the limit of 2147483647: ask for fewer (--patches) or larger ones (--patch-size)"
+    )]
     TooMany(f64),
     /// A size or a count that is not positive.
     #[error("a patch size of {0} makes no sense: expected a positive number of metres, or inf")]
@@ -182,9 +186,10 @@ impl PatchScene {
                     roughness: 1.0,
                 });
                 attributes.push(Attributes {
-                    normals: mesh.normals.as_ref().map(|n| {
-                        corner.map(|k| (normal_matrix * vec(n[k])).normalize_or_zero().as_vec3().to_array())
-                    }),
+                    normals: mesh
+                        .normals
+                        .as_ref()
+                        .map(|n| corner.map(|k| (normal_matrix * vec(n[k])).normalize_or_zero().as_vec3().to_array())),
                     texcoords: mesh.texcoords.as_ref().map(|t| corner.map(|k| t[k])),
                 });
             }
@@ -422,9 +427,9 @@ impl PatchScene {
     /// Normal for display at a point of a triangle's side: interpolated vertex normals where there are any.
     pub fn shading_normal(&self, triangle: u32, side: Side, u: f64, v: f64) -> DVec3 {
         let flat = self.triangles[triangle as usize].normal;
-        let smooth = self.attributes[triangle as usize].normals.map_or(flat, |n| {
-            (vec(n[0]) * (1.0 - u - v) + vec(n[1]) * u + vec(n[2]) * v).normalize_or(flat)
-        });
+        let smooth = self.attributes[triangle as usize]
+            .normals
+            .map_or(flat, |n| (vec(n[0]) * (1.0 - u - v) + vec(n[1]) * u + vec(n[2]) * v).normalize_or(flat));
         // Authors' normals may point either way on two-sided surfaces; the side decides.
         let front = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
         if side == Side::Front { front } else { -front }
@@ -443,7 +448,8 @@ impl PatchScene {
     /// Bytes of the ray kernel and of the patches' constants.
     pub fn bytes(&self) -> [usize; 2] {
         let per_triangle = size_of::<Triangle>() + size_of::<Attributes>();
-        let per_patch = 4 + 12 + if self.emission.is_empty() { 0 } else { 12 } + if self.coverage.is_empty() { 0 } else { 4 };
+        let per_patch =
+            4 + 12 + if self.emission.is_empty() { 0 } else { 12 } + if self.coverage.is_empty() { 0 } else { 4 };
         [self.kernel.bytes(), self.triangles.len() * per_triangle + self.len() * per_patch]
     }
 
@@ -479,7 +485,8 @@ impl PatchScene {
                     self.emission.extend((0..count).map(|k| if on { cell(&means.emission, k) } else { [0.0; 3] }));
                 }
                 if holes {
-                    self.coverage.extend((0..count).map(|k| means.coverage[if means.coverage.len() == 1 { 0 } else { k }]));
+                    self.coverage
+                        .extend((0..count).map(|k| means.coverage[if means.coverage.len() == 1 { 0 } else { k }]));
                 }
             }
         }
@@ -493,7 +500,9 @@ impl PatchScene {
         let material = &self.materials[t.material as usize];
         let texel = base_texel(&material.surface);
         let (mut metallic, mut roughness, mut mr_texture) = (0.0, 1.0, None);
-        if let Surface::MetallicRoughness { metallic: m, roughness: r, metallic_roughness_texture, .. } = &material.surface {
+        if let Surface::MetallicRoughness { metallic: m, roughness: r, metallic_roughness_texture, .. } =
+            &material.surface
+        {
             (metallic, roughness, mr_texture) = (*m, *r, metallic_roughness_texture.as_ref());
         }
         let has_uv = self.attributes[triangle as usize].texcoords.is_some();

@@ -32,7 +32,9 @@ impl Scene {
             if mesh.positions.iter().flatten().any(|x| !x.is_finite()) {
                 fault(element(), "a vertex position is not finite".into());
             }
-            if mesh.normals.as_ref().is_some_and(|v| v.len() != n) || mesh.texcoords.as_ref().is_some_and(|v| v.len() != n) {
+            if mesh.normals.as_ref().is_some_and(|v| v.len() != n)
+                || mesh.texcoords.as_ref().is_some_and(|v| v.len() != n)
+            {
                 fault(element(), format!("attributes of another length than the {n} positions"));
             }
         }
@@ -73,7 +75,8 @@ impl Scene {
             }
         }
         for (i, image) in self.images.iter().enumerate() {
-            if image.rgba.len() as u64 != 4 * u64::from(image.width) * u64::from(image.height) || image.rgba.is_empty() {
+            if image.rgba.len() as u64 != 4 * u64::from(image.width) * u64::from(image.height) || image.rgba.is_empty()
+            {
                 fault(format!("image {i} \"{}\"", image.name), "its size does not match its texels".into());
             }
         }

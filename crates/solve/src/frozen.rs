@@ -51,6 +51,9 @@ pub struct Frozen {
     environment_share: f64,
 }
 
+/// Bytes of a frozen glossy patch.
+pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = size_of::<GlossyLight>();
+
 #[derive(Clone, Copy, Debug)]
 struct GlossyLight {
     directional: Option<Directional>,
@@ -163,10 +166,9 @@ impl Frozen {
     #[inline]
     pub fn sky(&self, scene: &PatchScene, towards: DVec3) -> Endpoint {
         match scene.environment() {
-            Some(e) if self.environment_share > 0.0 => Endpoint {
-                radiance: e.radiance(towards),
-                density: self.environment_share * e.pdf_line(towards),
-            },
+            Some(e) if self.environment_share > 0.0 => {
+                Endpoint { radiance: e.radiance(towards), density: self.environment_share * e.pdf_line(towards) }
+            }
             _ => Endpoint { radiance: Rgb::BLACK, density: 0.0 },
         }
     }

@@ -95,6 +95,14 @@ impl<'a> Solver<'a> {
         }
     }
 
+    /// The estimated relative error of the solution so far, as [`Solution::relative_error`]. O(K).
+    pub fn relative_error(&self) -> f64 {
+        match &self.state {
+            State::Sequential(s, _) => s.relative_error(self.scene),
+            State::Waves(w) => w.relative_error(self.scene),
+        }
+    }
+
     /// A snapshot of the light. O(K).
     pub fn solution(&self) -> Solution {
         match &self.state {
@@ -102,4 +110,9 @@ impl<'a> Solver<'a> {
             State::Waves(w) => w.solution(self.scene, &self.glossy, &self.params),
         }
     }
+}
+
+/// Bytes of solver state for a scene of so many patches, of which some are glossy (default schedule).
+pub fn state_bytes(patches: usize, glossy: usize) -> usize {
+    patches * crate::waves::BYTES_PER_PATCH + glossy * crate::waves::BYTES_PER_GLOSSY_PATCH
 }

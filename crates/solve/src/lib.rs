@@ -31,7 +31,7 @@ pub mod transfer;
 mod wave;
 mod waves;
 
-pub use iterate::Solver;
+pub use iterate::{Solver, state_bytes};
 pub use observer::Observer;
 pub use params::{Estimator, Params, Representation, Schedule, SolveError};
 pub use solution::{PowerBalance, Solution};

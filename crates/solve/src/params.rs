@@ -102,6 +102,8 @@ pub enum SolveError {
         expected: &'static str,
     },
     /// The paper's schedule knows no environment.
-    #[error("the paper preset selects patches only and cannot shoot from an environment: use the default preset, or light the scene with emitting surfaces")]
+    #[error(
+        "the paper preset selects patches only and cannot shoot from an environment: use the default preset, or light the scene with emitting surfaces"
+    )]
     PaperEnvironment,
 }

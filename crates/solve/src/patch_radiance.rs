@@ -6,10 +6,10 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use twinray_scene::Rgb;
 use twinray_scene::brdf::Brdf;
 use twinray_scene::geom::Frame;
 use twinray_scene::sample::warp;
-use twinray_scene::Rgb;
 
 use crate::transfer::Endpoint;
 
@@ -120,8 +120,8 @@ mod tests {
             };
             let total = PI * out.cosine_density + out.lobe_density;
             let mut stream = Stream::new(31, i as u64, 0);
-            let samples = (0..200_000)
-                .map(|_| out.sample(n, [stream.uniform(), stream.uniform()]).map(|d| d.to_array()));
+            let samples =
+                (0..200_000).map(|_| out.sample(n, [stream.uniform(), stream.uniform()]).map(|d| d.to_array()));
             let pdf = |d: [f64; 3]| {
                 let d = DVec3::from_array(d);
                 if n.dot(d) > 0.0 { out.density(n, d) * n.dot(d) / total } else { 0.0 }

@@ -87,7 +87,14 @@ impl Sequential {
     }
 
     /// `rays` iterations, in batches against one state.
-    pub(crate) fn advance(&mut self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params, rays: u64, batch: u64) {
+    pub(crate) fn advance(
+        &mut self,
+        scene: &PatchScene,
+        glossy: &GlossyPatches,
+        params: &Params,
+        rays: u64,
+        batch: u64,
+    ) {
         let mut done = 0;
         while done < rays {
             let size = batch.min(rays - done);
@@ -178,10 +185,19 @@ impl Sequential {
     }
 
     /// Brings a glossy patch's picture sum up to iteration `until`, through which its state has not changed.
-    fn observe(&mut self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params, patch: PatchId, k: usize, until: u64) {
+    fn observe(
+        &mut self,
+        scene: &PatchScene,
+        glossy: &GlossyPatches,
+        params: &Params,
+        patch: PatchId,
+        k: usize,
+        until: u64,
+    ) {
         let state = &self.glossy[k];
         if let (Some(eye), Some(unscaled)) = (glossy.to_eye(k), self.directional(scene, params, patch, k, 1)) {
-            let radiance = unscaled.irradiance * (unscaled.brdf.eval(scene.normal(patch), unscaled.wi, eye) - unscaled.main_reflectance);
+            let radiance = unscaled.irradiance
+                * (unscaled.brdf.eval(scene.normal(patch), unscaled.wi, eye) - unscaled.main_reflectance);
             let observed = radiance * (harmonic(until) - harmonic(state.seen));
             self.glossy[k].observed_n += observed;
         }
@@ -189,7 +205,14 @@ impl Sequential {
     }
 
     /// The directional part at iteration `n`.
-    fn directional(&self, scene: &PatchScene, params: &Params, patch: PatchId, k: usize, n: u64) -> Option<Directional> {
+    fn directional(
+        &self,
+        scene: &PatchScene,
+        params: &Params,
+        patch: PatchId,
+        k: usize,
+        n: u64,
+    ) -> Option<Directional> {
         let state = &self.glossy[k];
         if state.representative.importance <= 0.0 || params.representation == Representation::Main {
             return None;
@@ -248,6 +271,11 @@ impl Sequential {
         }
     }
 
+    pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
+        let n = self.n.max(1) as f64;
+        self.tally.relative_error(scene, n, |p| Rgb::from_array(self.irradiance_n[p.index()]).luminance() / n)
+    }
+
     pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
         let n = self.n.max(1) as f64;
         let irradiance: Vec<[f32; 3]> =
@@ -270,18 +298,13 @@ impl Sequential {
             GlossySolution { main_part, directional, observed_lobe }
         });
         let glossy_light = glossy_light.collect();
-        let mut relative = 0.0;
-        for p in scene.patches().filter(|&p| scene.emission(p).is_black()) {
-            relative += scene.area(p) * Rgb::from_f32(irradiance[p.index()]).luminance().powi(2);
-        }
-        let variance = self.tally.squares / (n * n) - relative / n;
         Solution {
             rays: self.n,
             irradiance,
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&self.tally, self.emitted, n),
-            relative_error: if relative > 0.0 { (variance.max(0.0) / relative).sqrt() } else { 0.0 },
+            relative_error: self.relative_error(scene),
             tally: self.tally,
         }
     }

@@ -95,7 +95,15 @@ pub struct WaveResult {
 
 impl WaveContext<'_> {
     /// Shoots rays `first .. first + count` of the sequence against `frozen`.
-    pub fn run(&self, frozen: &Frozen, sobol: &Sobol, first: u64, count: u64, sums: &WaveSums, unit: Unit) -> WaveResult {
+    pub fn run(
+        &self,
+        frozen: &Frozen,
+        sobol: &Sobol,
+        first: u64,
+        count: u64,
+        sums: &WaveSums,
+        unit: Unit,
+    ) -> WaveResult {
         let chunks: Vec<WaveResult> = (0..count.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {

@@ -33,6 +33,12 @@ const LARGEST_WAVE: u64 = 1 << 21;
 /// albedo .95) is what tiny scenes would otherwise remember.
 const SMALLEST_WARM_START: u64 = 1 << 16;
 
+/// Sums, frozen radiance and selection table.
+pub(crate) const BYTES_PER_PATCH: usize = 24 + 24 + 24 + 12 + 8 + 4;
+/// Beside that: the numbering (over all patches, counted here), sums, state and frozen light of glossy patches.
+pub(crate) const BYTES_PER_GLOSSY_PATCH: usize =
+    4 + 4 + 24 + 3 * 24 + size_of::<GlossyState>() + crate::frozen::BYTES_PER_GLOSSY_PATCH;
+
 /// State of the default schedule.
 #[derive(Debug)]
 pub(crate) struct Waves {
@@ -131,15 +137,17 @@ impl Waves {
     fn close(&mut self, scene: &PatchScene, glossy: &GlossyPatches, unit: Unit, weight: f64, share: f64) {
         let sums = &self.sums;
         let reflected: Vec<Rgb> = (0..self.glossy.len()).map(|k| sums.reflected.take(k, unit)).collect();
-        self.source.par_iter_mut().zip(&mut self.output).enumerate().with_min_len(4096).for_each(|(i, (source, output))| {
-            let arrived = sums.arrived.take(i, unit);
-            let returned = match glossy.number_of(PatchId(i as u32)) {
-                Some(k) => reflected[k],
-                None => arrived * scene.brdf(PatchId(i as u32)).mean_albedo(),
-            };
-            *source = (Rgb::from_array(*source) + returned * weight).to_array();
-            *output = (Rgb::from_array(*output) + arrived * share).to_array();
-        });
+        self.source.par_iter_mut().zip(&mut self.output).enumerate().with_min_len(4096).for_each(
+            |(i, (source, output))| {
+                let arrived = sums.arrived.take(i, unit);
+                let returned = match glossy.number_of(PatchId(i as u32)) {
+                    Some(k) => reflected[k],
+                    None => arrived * scene.brdf(PatchId(i as u32)).mean_albedo(),
+                };
+                *source = (Rgb::from_array(*source) + returned * weight).to_array();
+                *output = (Rgb::from_array(*output) + arrived * share).to_array();
+            },
+        );
         for (k, state) in self.glossy.iter_mut().enumerate() {
             state.reflected += reflected[k] * share;
             state.observed += sums.observed.take(k, unit) * share;
@@ -323,12 +331,16 @@ impl Waves {
         Shot { total, sky }
     }
 
+    pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
+        let w = self.output_weight.max(f64::MIN_POSITIVE);
+        let luminance = |p: PatchId| Rgb::from_array(self.output[p.index()]).luminance() / (w * scene.area(p));
+        self.tally.relative_error(scene, w, luminance)
+    }
+
     pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
         let w = self.output_weight.max(f64::MIN_POSITIVE);
-        let irradiance: Vec<[f32; 3]> = scene
-            .patches()
-            .map(|p| (Rgb::from_array(self.output[p.index()]) / (w * scene.area(p))).to_f32())
-            .collect();
+        let irradiance: Vec<[f32; 3]> =
+            scene.patches().map(|p| (Rgb::from_array(self.output[p.index()]) / (w * scene.area(p))).to_f32()).collect();
         let glossy_light = glossy.patches().iter().enumerate().map(|(k, &p)| {
             let per_area = 1.0 / (w * scene.area(p));
             let observed = glossy.to_eye(k).filter(|_| params.representation != Representation::Main);
@@ -339,18 +351,13 @@ impl Waves {
             }
         });
         let glossy_light = glossy_light.collect();
-        let mut relative = 0.0;
-        for p in scene.patches().filter(|&p| scene.emission(p).is_black()) {
-            relative += scene.area(p) * Rgb::from_f32(irradiance[p.index()]).luminance().powi(2);
-        }
-        let variance = self.tally.squares / (w * w) - relative / w;
         Solution {
             rays: self.n,
             irradiance,
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&self.tally, self.emitted, w),
-            relative_error: if relative > 0.0 { (variance.max(0.0) / relative).sqrt() } else { 0.0 },
+            relative_error: self.relative_error(scene),
             tally: self.tally,
         }
     }

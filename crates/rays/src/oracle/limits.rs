@@ -13,27 +13,18 @@ fn a_hundred_thousand_coincident_triangles() {
     let mut triangles = vec![[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]; 100_000];
     triangles.extend(soup(100, 1.0, &mut Random(5)));
     let mut random = Random(6);
-    let rays: Vec<Ray> = (0..50)
-        .map(|_| Ray::new([0.3, 0.3, 2.0], random.point()))
-        .collect();
+    let rays: Vec<Ray> = (0..50).map(|_| Ray::new([0.3, 0.3, 2.0], random.point())).collect();
     check(&triangles, rays);
-    let hit = Bvh::build(&triangles)
-        .closest_hit(&Ray::new([0.3, 0.3, 1e-3], [0.0, 0.0, -1.0]))
-        .unwrap();
+    let hit = Bvh::build(&triangles).closest_hit(&Ray::new([0.3, 0.3, 1e-3], [0.0, 0.0, -1.0])).unwrap();
     assert_eq!((hit.triangle, hit.front), (0, true));
 }
 
 /// Levels of inner nodes.
 fn depth(tree: &Tree, node: usize) -> usize {
     let Node { planes, children } = &tree.nodes[node];
-    let used = (0..LANES)
-        .filter(|&lane| planes[0][lane] <= planes[3][lane])
-        .map(|lane| children[lane]);
+    let used = (0..LANES).filter(|&lane| planes[0][lane] <= planes[3][lane]).map(|lane| children[lane]);
     let inner = used.filter(|child| !child.is_leaf());
-    1 + inner
-        .map(|child| depth(tree, child.index()))
-        .max()
-        .unwrap_or(0)
+    1 + inner.map(|child| depth(tree, child.index())).max().unwrap_or(0)
 }
 
 #[test]
@@ -47,12 +38,7 @@ fn skewed_input_keeps_the_depth_bounded() {
     let depth = depth(&build(&triangles), 0);
     println!("depth {depth}");
     assert!(depth <= MAX_DEPTH, "{depth}");
-    let rays = [
-        [1.0, 1.0, 1.0],
-        [-1.0, -1.0, -1.0],
-        [0.3, 0.2, 1.0],
-        [1e-6, 1.0, 1e-9],
-    ];
+    let rays = [[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0], [0.3, 0.2, 1.0], [1e-6, 1.0, 1e-9]];
     assert!(check(&triangles, rays.map(|d| Ray::new([1e-3, 1e-3, 1e-3], d))) > 0);
 }
 
@@ -70,15 +56,9 @@ fn bad_numbers_are_left_out_and_counted() {
     triangles.push([[1.0, 2.0, 3.0]; 3]);
     triangles.push([[0.0; 3], [1.0; 3], [2.0; 3]]);
     let bvh = Bvh::build(&triangles);
-    assert_eq!(
-        (bvh.left_out(), bvh.triangle_count()),
-        (triangles.len() - 1, triangles.len())
-    );
+    assert_eq!((bvh.left_out(), bvh.triangle_count()), (triangles.len() - 1, triangles.len()));
     assert_eq!(bvh.bounds(), Some([[0.0; 3], [1.0, 1.0, 0.0]]));
-    assert_eq!(
-        check(&triangles, [Ray::new([0.2, 0.2, 1.0], [0.0, 0.0, -1.0])]),
-        1
-    );
+    assert_eq!(check(&triangles, [Ray::new([0.2, 0.2, 1.0], [0.0, 0.0, -1.0])]), 1);
 }
 
 #[test]
@@ -86,32 +66,13 @@ fn rays_of_any_bits_end() {
     let mut random = Random(7);
     let triangles = soup(300, 0.3, &mut random);
     let any = |random: &mut Random| f32::from_bits(random.bits() as u32);
-    let special = [
-        0.0,
-        -0.0,
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        1e-40,
-        1e-19,
-        1.0,
-        1e19,
-        f32::MAX,
-    ];
+    let special = [0.0, -0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, 1e-19, 1.0, 1e19, f32::MAX];
     for round in 0..20_000 {
         let mut number = || {
-            if round % 2 == 0 {
-                any(&mut random)
-            } else {
-                random.pick(&special)
-            }
+            if round % 2 == 0 { any(&mut random) } else { random.pick(&special) }
         };
-        let ray = Ray {
-            origin: [0; 3].map(|_| number()),
-            direction: [0; 3].map(|_| number()),
-            t_max: number(),
-            skip: 0,
-        };
+        let ray =
+            Ray { origin: [0; 3].map(|_| number()), direction: [0; 3].map(|_| number()), t_max: number(), skip: 0 };
         check(&triangles[..20], [ray]);
     }
 }
@@ -120,10 +81,7 @@ fn rays_of_any_bits_end() {
 fn the_build_does_not_depend_on_threads() {
     let triangles = soup(30_000, 0.02, &mut Random(8));
     let build_on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| build(&triangles))
     };
     let one = build_on(1);
@@ -131,16 +89,8 @@ fn the_build_does_not_depend_on_threads() {
         let many = build_on(threads);
         assert!(one.nodes == many.nodes, "nodes on {threads} threads");
         // Bits, because unused lanes hold NaN.
-        let bits = |leaf: &Leaf| {
-            (
-                leaf.vertices.map(|v| v.map(|a| a.map(f32::to_bits))),
-                leaf.labels,
-            )
-        };
-        assert!(
-            one.leaves.iter().map(bits).eq(many.leaves.iter().map(bits)),
-            "leaves on {threads} threads"
-        );
+        let bits = |leaf: &Leaf| (leaf.vertices.map(|v| v.map(|a| a.map(f32::to_bits))), leaf.labels);
+        assert!(one.leaves.iter().map(bits).eq(many.leaves.iter().map(bits)), "leaves on {threads} threads");
     }
 }
 
@@ -154,37 +104,15 @@ fn lanes_agree_to_the_bit() {
         return;
     }
     let mut random = Random(9);
-    let numbers = [
-        0.0,
-        -0.0,
-        1.0,
-        -1.0,
-        0.5,
-        2.0,
-        1e-30,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::NAN,
-    ];
+    let numbers = [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 1e-30, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
     for round in 0..50_000 {
         let mut number = || {
-            if round % 3 == 0 {
-                random.pick(&numbers)
-            } else {
-                random.signed()
-            }
+            if round % 3 == 0 { random.pick(&numbers) } else { random.signed() }
         };
         let mut node = Node::empty();
-        node.planes
-            .iter_mut()
-            .flatten()
-            .for_each(|plane| *plane = number());
+        node.planes.iter_mut().flatten().for_each(|plane| *plane = number());
         let mut leaf = Leaf::empty();
-        leaf.vertices
-            .iter_mut()
-            .flatten()
-            .flatten()
-            .for_each(|c| *c = number());
+        leaf.vertices.iter_mut().flatten().flatten().for_each(|c| *c = number());
         let t_cull = number();
         let ray = Ray::new([0; 3].map(|_| number()), [0; 3].map(|_| number()));
         let Some(mut ray) = PreparedRay::new(&ray, &[[-1.0; 3], [1.0; 3]]) else {
@@ -196,15 +124,7 @@ fn lanes_agree_to_the_bit() {
         }
         let (mask, near) = Portable::boxes(&node, &ray, t_cull);
         let (mask_avx2, near_avx2) = Avx2::boxes(&node, &ray, t_cull);
-        assert_eq!(
-            (mask, near.map(f32::to_bits)),
-            (mask_avx2, near_avx2.map(f32::to_bits)),
-            "{node:?} {ray:?}"
-        );
-        assert_eq!(
-            Portable::triangles(&leaf, &ray),
-            Avx2::triangles(&leaf, &ray),
-            "{leaf:?} {ray:?}"
-        );
+        assert_eq!((mask, near.map(f32::to_bits)), (mask_avx2, near_avx2.map(f32::to_bits)), "{node:?} {ray:?}");
+        assert_eq!(Portable::triangles(&leaf, &ray), Avx2::triangles(&leaf, &ray), "{leaf:?} {ray:?}");
     }
 }

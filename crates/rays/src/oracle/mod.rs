@@ -40,26 +40,14 @@ fn check(triangles: &[Triangle], rays: impl IntoIterator<Item = Ray>) -> usize {
     assert_eq!(bvh.left_out() + leaves.len(), triangles.len());
     let mut hits = 0;
     for ray in rays {
-        let prepared = bvh
-            .bounds()
-            .and_then(|bounds| PreparedRay::new(&ray, &bounds));
-        let expected = prepared
-            .as_ref()
-            .and_then(|prepared| brute_force(&leaves, prepared));
+        let prepared = bvh.bounds().and_then(|bounds| PreparedRay::new(&ray, &bounds));
+        let expected = prepared.as_ref().and_then(|prepared| brute_force(&leaves, prepared));
         // The public calls take the widest instruction set there is, the others are named.
         assert_eq!(bvh.closest_hit(&ray), expected, "{ray:?}");
         assert_eq!(bvh.occluded(&ray), expected.is_some(), "{ray:?}");
         if let Some(prepared) = &prepared {
-            assert_eq!(
-                bvh.closest::<Portable>(prepared, |_| true),
-                expected,
-                "portable, {ray:?}"
-            );
-            assert_eq!(
-                bvh.any::<Portable>(prepared),
-                expected.is_some(),
-                "portable, {ray:?}"
-            );
+            assert_eq!(bvh.closest::<Portable>(prepared, |_| true), expected, "portable, {ray:?}");
+            assert_eq!(bvh.any::<Portable>(prepared), expected.is_some(), "portable, {ray:?}");
         }
         hits += usize::from(expected.is_some());
     }

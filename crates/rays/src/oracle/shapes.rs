@@ -30,19 +30,9 @@ fn lattice_boxes(n: i32) -> Vec<Triangle> {
 #[test]
 fn soups_of_every_size_and_shape() {
     let mut random = Random(1);
-    for (count, size) in [
-        (1, 1.0),
-        (7, 1.0),
-        (8, 0.5),
-        (9, 0.5),
-        (64, 0.3),
-        (1000, 0.1),
-        (1000, 1.0),
-    ] {
+    for (count, size) in [(1, 1.0), (7, 1.0), (8, 0.5), (9, 0.5), (64, 0.3), (1000, 0.1), (1000, 1.0)] {
         let triangles = soup(count, size, &mut random);
-        let rays: Vec<Ray> = (0..4000)
-            .map(|_| Ray::new(random.point(), random.point()))
-            .collect();
+        let rays: Vec<Ray> = (0..4000).map(|_| Ray::new(random.point(), random.point())).collect();
         assert!(check(&triangles, rays) > 20);
     }
 }
@@ -51,13 +41,7 @@ fn soups_of_every_size_and_shape() {
 fn needles_and_scales() {
     let mut random = Random(2);
     let mut hits = 0;
-    for (scale, offset) in [
-        (1.0, 1.5e5),
-        (1e3, 1.5e5),
-        (1e-12, 0.0),
-        (1e17, 0.0),
-        (1.0, 0.0),
-    ] {
+    for (scale, offset) in [(1.0, 1.5e5), (1e3, 1.5e5), (1e-12, 0.0), (1e17, 0.0), (1.0, 0.0)] {
         let mut triangles = soup(500, 0.5, &mut random);
         for [a, b, c] in triangles.iter_mut() {
             // The third vertex a hair off the line of the others.
@@ -71,10 +55,7 @@ fn needles_and_scales() {
             .map(|_| {
                 // At points of triangles, or a needle would never be met.
                 let ([a, b, c], origin) = (random.pick(&triangles), place(random.point()));
-                Ray::new(
-                    origin,
-                    [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0 - origin[k]),
-                )
+                Ray::new(origin, [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0 - origin[k]))
             })
             .collect();
         hits += check(&triangles, rays);
@@ -90,16 +71,10 @@ fn rays_along_axes_and_in_planes_of_boxes() {
         .map(|_| {
             // Half steps: origins on planes, edges and corners of boxes, and between; directions
             // with zeros of both signs.
-            let origin =
-                [0; 3].map(|_| random.pick(&[-1.0, -0.5, 0.0, 0.5, 1.0, 2.5, 3.0, 6.0, 7.0]));
+            let origin = [0; 3].map(|_| random.pick(&[-1.0, -0.5, 0.0, 0.5, 1.0, 2.5, 3.0, 6.0, 7.0]));
             let direction = [0; 3].map(|_| random.pick(&[0.0, -0.0, 1.0, -1.0, 0.0, -0.0, 0.5]));
             let t_max = random.pick(&[0.5, 1.0, 3.0, f32::INFINITY]);
-            Ray {
-                origin,
-                direction,
-                t_max,
-                skip: random.pick(&[NO_TRIANGLE, 0, 100]),
-            }
+            Ray { origin, direction, t_max, skip: random.pick(&[NO_TRIANGLE, 0, 100]) }
         })
         .collect();
     let hits = check(&triangles, rays);
@@ -173,26 +148,12 @@ fn rays_that_start_beside_a_wall() {
 #[test]
 fn one_flat_sheet() {
     // All boxes have no thickness, and a ray may lie in the plane of all of them.
-    let sheet: Vec<Triangle> = lattice_boxes(8)
-        .into_iter()
-        .filter(|t| t.iter().all(|v| v[1] == 0.0))
-        .collect();
+    let sheet: Vec<Triangle> = lattice_boxes(8).into_iter().filter(|t| t.iter().all(|v| v[1] == 0.0)).collect();
     let mut random = Random(4);
     let rays: Vec<Ray> = (0..5000)
         .map(|_| {
-            let origin = [
-                random.signed() * 8.0,
-                random.pick(&[0.0, 1.0]),
-                random.signed() * 8.0,
-            ];
-            Ray::new(
-                origin,
-                [
-                    random.signed(),
-                    random.pick(&[0.0, -0.0, -1.0, -1e-30]),
-                    random.signed(),
-                ],
-            )
+            let origin = [random.signed() * 8.0, random.pick(&[0.0, 1.0]), random.signed() * 8.0];
+            Ray::new(origin, [random.signed(), random.pick(&[0.0, -0.0, -1.0, -1e-30]), random.signed()])
         })
         .collect();
     let hits = check(&sheet, rays);

@@ -10,11 +10,7 @@ fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -31,11 +27,7 @@ fn moeller_trumbore(ray: &Ray, triangle: &[[f32; 3]; 3]) -> Option<(f64, f64, f6
     let determinant = dot(e, p);
     let s = sub(origin, a);
     let q = cross(s, e);
-    let (u, v, t) = (
-        dot(s, p) / determinant,
-        dot(direction, q) / determinant,
-        dot(f, q) / determinant,
-    );
+    let (u, v, t) = (dot(s, p) / determinant, dot(direction, q) / determinant, dot(f, q) / determinant);
     let margin = u.min(v).min(1.0 - u - v);
     (margin >= 0.0 && t > 0.0).then_some((t, u, v, determinant > 0.0, margin))
 }
@@ -48,10 +40,7 @@ fn agrees_with_moeller_trumbore() {
     let (mut compared, mut hit_something) = (0, 0);
     for _ in 0..20_000 {
         let ray = Ray::new(random.point(), random.point());
-        let all = triangles
-            .iter()
-            .enumerate()
-            .filter_map(|(id, t)| moeller_trumbore(&ray, t).map(|hit| (id, hit)));
+        let all = triangles.iter().enumerate().filter_map(|(id, t)| moeller_trumbore(&ray, t).map(|hit| (id, hit)));
         let expected = all.min_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let got = bvh.closest_hit(&ray);
         // Within rounding of an edge the two may differ: those are the business of the watertight
@@ -73,16 +62,10 @@ fn agrees_with_moeller_trumbore() {
         for (what, got, expected) in [("t", hit.t, t), ("u", hit.u, u), ("v", hit.v, v)] {
             // Grazing hits amplify the rounding of the coordinates; 1e-3 still tells any two
             // quantities apart.
-            assert!(
-                (f64::from(got) - expected).abs() < 1e-3 * (1.0 + expected),
-                "{what}: {got} against {expected}"
-            );
+            assert!((f64::from(got) - expected).abs() < 1e-3 * (1.0 + expected), "{what}: {got} against {expected}");
         }
     }
-    assert!(
-        compared > 19_900 && hit_something > 10_000,
-        "{compared} {hit_something}"
-    );
+    assert!(compared > 19_900 && hit_something > 10_000, "{compared} {hit_something}");
 }
 
 /// The two names of a hit, `origin + t * direction` and the barycentric point, are one place,
@@ -105,11 +88,7 @@ fn the_hit_lies_on_the_triangle_and_on_the_ray() {
         let origin = random.point().map(|c| c * scale + offset);
         let weights = [random.unit(), random.unit(), random.unit()];
         let sum: f32 = weights.iter().sum();
-        let direction = [0, 1, 2].map(|k| {
-            (0..3)
-                .map(|i| (triangle[i][k] - origin[k]) * weights[i] / sum)
-                .sum()
-        });
+        let direction = [0, 1, 2].map(|k| (0..3).map(|i| (triangle[i][k] - origin[k]) * weights[i] / sum).sum());
         let ray = Ray::new(origin, direction);
         let Some(hit) = Bvh::build(&[triangle]).closest_hit(&ray) else {
             continue;
@@ -123,18 +102,10 @@ fn the_hit_lies_on_the_triangle_and_on_the_ray() {
 fn check_place(ray: &Ray, triangle: &[[f32; 3]; 3], hit: &Hit) {
     let unit = f64::from(f32::EPSILON) / 2.0;
     let (u, v, t) = (f64::from(hit.u), f64::from(hit.v), f64::from(hit.t));
-    assert!(
-        (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v) && u + v <= 1.0 + 2.0 * unit,
-        "{hit:?}"
-    );
-    let extent: [f64; 3] = [0, 1, 2].map(|k| {
-        (0..3)
-            .map(|i| (f64::from(triangle[i][k]) - f64::from(ray.origin[k])).abs())
-            .fold(0.0, f64::max)
-    });
-    let z = (0..3)
-        .max_by(|&i, &j| ray.direction[i].abs().total_cmp(&ray.direction[j].abs()))
-        .unwrap();
+    assert!((0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v) && u + v <= 1.0 + 2.0 * unit, "{hit:?}");
+    let extent: [f64; 3] = [0, 1, 2]
+        .map(|k| (0..3).map(|i| (f64::from(triangle[i][k]) - f64::from(ray.origin[k])).abs()).fold(0.0, f64::max));
+    let z = (0..3).max_by(|&i, &j| ray.direction[i].abs().total_cmp(&ray.direction[j].abs())).unwrap();
     for axis in 0..3 {
         let [a, b, c] = [0, 1, 2].map(|i| f64::from(triangle[i][axis]));
         let barycentric = (1.0 - u - v) * a + u * b + v * c;

@@ -29,9 +29,7 @@ impl Shell {
             vertices.extend([[0.0, a, b], [a, b, 0.0], [b, 0.0, a]]);
         }
         // Faces of the icosahedron: triples of vertices at the least distance, 2.
-        let near = |a: [f64; 3], b: [f64; 3]| {
-            ((0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>() - 4.0).abs() < 1e-9
-        };
+        let near = |a: [f64; 3], b: [f64; 3]| ((0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>() - 4.0).abs() < 1e-9;
         let mut faces = Vec::new();
         for i in 0..12 {
             for j in i + 1..12 {
@@ -64,11 +62,7 @@ impl Shell {
             let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
             v.map(|c| (c / length) as f32)
         };
-        Shell {
-            vertices: vertices.iter().map(unit).collect(),
-            faces,
-            centre: [0.0; 3],
-        }
+        Shell { vertices: vertices.iter().map(unit).collect(), faces, centre: [0.0; 3] }
     }
 
     /// The cube -1 … 1, each side of `n` × `n` cells.
@@ -87,21 +81,12 @@ impl Shell {
                     })
                 };
                 for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                    let (a, b, c, d) = (
-                        vertex(i, j),
-                        vertex(i + 1, j),
-                        vertex(i + 1, j + 1),
-                        vertex(i, j + 1),
-                    );
+                    let (a, b, c, d) = (vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
                     faces.extend([[a, b, c], [a, c, d]]);
                 }
             }
         }
-        Shell {
-            vertices,
-            faces,
-            centre: [0.0; 3],
-        }
+        Shell { vertices, faces, centre: [0.0; 3] }
     }
 
     fn placed(mut self, scale: f32, offset: [f32; 3]) -> Shell {
@@ -115,36 +100,22 @@ impl Shell {
     /// Rays from inside, in turn at vertices, at middles of edges and at other points of edges;
     /// returns how many get out of a million.
     fn leaks_per_million(&self, spread: f32, count: usize) -> f64 {
-        let triangles: Vec<_> = self
-            .faces
-            .iter()
-            .map(|face| face.map(|i| self.vertices[i]))
-            .collect();
+        let triangles: Vec<_> = self.faces.iter().map(|face| face.map(|i| self.vertices[i])).collect();
         let bvh = Bvh::build(&triangles);
         let mut random = Random(31);
         let mut leaks = 0;
         for round in 0..count {
             let face = self.faces[random.below(self.faces.len())];
-            let (a, b) = (
-                self.vertices[face[round % 3]],
-                self.vertices[face[(round + 1) % 3]],
-            );
+            let (a, b) = (self.vertices[face[round % 3]], self.vertices[face[(round + 1) % 3]]);
             let fraction = [0.0, 0.5, random.unit()][random.below(3)];
             let origin = random.point();
             let origin = [0, 1, 2].map(|k| self.centre[k] + spread * origin[k]);
-            let ray = Ray::new(
-                origin,
-                [0, 1, 2].map(|k| a[k] + fraction * (b[k] - a[k]) - origin[k]),
-            );
+            let ray = Ray::new(origin, [0, 1, 2].map(|k| a[k] + fraction * (b[k] - a[k]) - origin[k]));
             leaks += usize::from(bvh.closest_hit(&ray).is_none());
             leaks += usize::from(!bvh.occluded(&ray));
         }
         let per_million = leaks as f64 / count as f64 * 1e6;
-        println!(
-            "{} triangles, {} left out, {per_million} leaks per million",
-            triangles.len(),
-            bvh.left_out()
-        );
+        println!("{} triangles, {} left out, {per_million} leaks per million", triangles.len(), bvh.left_out());
         per_million
     }
 }
@@ -181,10 +152,7 @@ fn two_triangles_a_side() {
 #[test]
 fn icosphere_far_away() {
     check(Shell::icosphere(5).placed(100.0, [1.5e5; 3]), 0.0);
-    check(
-        Shell::icosphere(5).placed(100.0, [1.5e5, 0.0, -1.5e5]),
-        50.0,
-    );
+    check(Shell::icosphere(5).placed(100.0, [1.5e5, 0.0, -1.5e5]), 50.0);
 }
 
 #[test]

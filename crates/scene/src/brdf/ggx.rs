@@ -32,14 +32,7 @@ pub struct Ggx {
 impl Ggx {
     /// From glTF parameters: base colour, metalness, perceptual roughness, `KHR_materials_specular` factor and
     /// colour, index of refraction. Roughness is limited by [`super::MIN_ALPHA`].
-    pub fn new(
-        base_color: Rgb,
-        metallic: f64,
-        roughness: f64,
-        specular: f64,
-        specular_color: Rgb,
-        ior: f64,
-    ) -> Self {
+    pub fn new(base_color: Rgb, metallic: f64, roughness: f64, specular: f64, specular_color: Rgb, ior: f64) -> Self {
         let metallic = metallic.clamp(0.0, 1.0);
         let normal_incidence = ((ior - 1.0) / (ior + 1.0)).powi(2);
         let coat = (specular_color * normal_incidence).map(|c| c.clamp(0.0, 1.0)) * specular;

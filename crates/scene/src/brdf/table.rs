@@ -99,9 +99,8 @@ pub(super) fn phong() -> &'static Table {
             let exponent = 2.0 / (width * width) - 2.0;
             let mirror = DVec3::new(-(1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
             let frame = crate::geom::Frame::from_normal(mirror);
-            let sum: f64 = unit_square()
-                .map(|u| frame.to_world(super::phong::around_axis(exponent, u)).z.max(0.0))
-                .sum();
+            let sum: f64 =
+                unit_square().map(|u| frame.to_world(super::phong::around_axis(exponent, u)).z.max(0.0)).sum();
             sum / (QUADRATURE * QUADRATURE) as f64 * (exponent + 2.0) / (exponent + 1.0)
         })
     })

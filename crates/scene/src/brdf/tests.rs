@@ -6,9 +6,8 @@ use super::*;
 use crate::sample::Stream;
 
 fn cases() -> Vec<(&'static str, Brdf)> {
-    let ggx = |metallic, roughness| {
-        Brdf::Ggx(Ggx::new(Rgb::new(0.9, 0.6, 0.3), metallic, roughness, 1.0, Rgb::WHITE, 1.5))
-    };
+    let ggx =
+        |metallic, roughness| Brdf::Ggx(Ggx::new(Rgb::new(0.9, 0.6, 0.3), metallic, roughness, 1.0, Rgb::WHITE, 1.5));
     let phong = |n| Brdf::Phong(Phong::new(Rgb::new(0.3, 0.2, 0.1), Rgb::grey(0.5), n));
     vec![
         ("lambertian", Brdf::Lambertian { reflectance: Rgb::grey(0.7) }),
@@ -55,9 +54,8 @@ fn albedo_is_the_integral_of_the_brdf() {
             let mut stream = Stream::new(22, 0, 0);
             let samples: Vec<f64> = (0..100_000)
                 .map(|_| {
-                    brdf.sample(NORMAL, wi, [stream.uniform(), stream.uniform()]).map_or(0.0, |wo| {
-                        brdf.eval(NORMAL, wi, wo).g * NORMAL.dot(wo) / brdf.pdf(NORMAL, wi, wo)
-                    })
+                    brdf.sample(NORMAL, wi, [stream.uniform(), stream.uniform()])
+                        .map_or(0.0, |wo| brdf.eval(NORMAL, wi, wo).g * NORMAL.dot(wo) / brdf.pdf(NORMAL, wi, wo))
                 })
                 .collect();
             let mean = twinray_testkit::ztest::Mean::of(&samples);

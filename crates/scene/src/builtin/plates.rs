@@ -23,7 +23,7 @@ pub fn plates(distance: f64) -> Scene {
 
     // From the side, half way up: both fronts are seen at a slant.
     let centre = DVec3::new(0.5, 0.5 * distance, 0.5);
-    let eye = centre + DVec3::new(-0.8, 0.0, 1.4) * (0.5 + 0.45 * distance);
+    let eye = centre + DVec3::new(-0.8, 0.0, 1.4) * (0.55 + 0.5 * distance);
     let camera = Camera::look_at("main", eye, centre, DVec3::Y, 60.0);
     builder.finish(vec![Camera { aspect: Some(1.0), ..camera }])
 }

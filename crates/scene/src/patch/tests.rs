@@ -94,9 +94,8 @@ fn textures_are_averaged_and_holes_shrink_patches() {
         rgba: vec![255, 255, 255, 255, 0, 0, 0, 0],
     })];
     let texture = TextureRef { image: 0, wrap: [Wrap::Clamp; 2], nearest: true };
-    scene.materials[0].surface = Surface::Lambertian {
-        reflectance: Texel { factor: Rgb::grey(0.8), texture: Some(texture) },
-    };
+    scene.materials[0].surface =
+        Surface::Lambertian { reflectance: Texel { factor: Rgb::grey(0.8), texture: Some(texture) } };
     let opaque = patches(&scene, 512);
     let mean = opaque.mean_albedo().g;
     assert!((mean - 0.4).abs() < 0.01, "{mean}");
@@ -112,8 +111,5 @@ fn textures_are_averaged_and_holes_shrink_patches() {
 fn nothing_to_cut_is_an_error() {
     assert_eq!(PatchScene::new(&Scene::default(), PatchOptions::default()).unwrap_err(), PatchError::Empty);
     let size = PatchOptions { budget: PatchBudget::Size(-1.0), ..PatchOptions::default() };
-    assert!(matches!(
-        PatchScene::new(&square(DAffine3::IDENTITY, false), size),
-        Err(PatchError::Size(_))
-    ));
+    assert!(matches!(PatchScene::new(&square(DAffine3::IDENTITY, false), size), Err(PatchError::Size(_))));
 }

@@ -52,10 +52,8 @@ impl Sobol {
         let point_key = mix(block_key ^ u64::from(low).wrapping_mul(0xD6E8_FEB8_6659_FD93));
         std::array::from_fn(|d| {
             let t = &self.tables[d];
-            let digits = t[0][bytes[0] as usize]
-                ^ t[1][bytes[1] as usize]
-                ^ t[2][bytes[2] as usize]
-                ^ t[3][bytes[3] as usize];
+            let digits =
+                t[0][bytes[0] as usize] ^ t[1][bytes[1] as usize] ^ t[2][bytes[2] as usize] ^ t[3][bytes[3] as usize];
             let high = owen_scramble(digits, mix(block_key.wrapping_add(d as u64 + 1)) as u32);
             let below = mix(point_key.wrapping_add(d as u64)) as u32;
             to_unit(u64::from(high) << 32 | u64::from(below))

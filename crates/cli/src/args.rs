@@ -1,0 +1,286 @@
+//! What can be said on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand, ValueEnum};
+
+/// The light of a whole scene, by bi-directional rays.
+#[derive(Debug, Parser)]
+#[command(name = "twinray", version, about, arg_required_else_help = true)]
+#[command(after_help = "SCENE is a .glb, .gltf or .obj file, or a built-in scene: \
+    furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse.\n\
+    Exit codes: 0 done, 2 bad input, 130 interrupted with the result kept.")]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Verbs, in the order light is computed.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Solve a scene and take a picture of it
+    Render(RenderArgs),
+    /// Say what is in a scene: triangles, patches, power, closedness, memory, warnings
+    Info(InfoArgs),
+    /// Write a built-in scene (or convert a file) to glTF or OBJ, so that other programs can load it
+    Scene(SceneArgs),
+}
+
+/// How a scene is loaded and cut.
+#[derive(Debug, clap::Args)]
+pub struct LoadArgs {
+    /// A .glb, .gltf or .obj file, or the name of a built-in scene
+    pub scene: String,
+    /// Number of patches to aim at, distributed by area [default: 100000, or what a built-in scene suggests]
+    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "patch_size")]
+    pub patches: Option<u64>,
+    /// Side of a patch in metres; inf: one patch per triangle
+    #[arg(long, value_name = "METRES")]
+    pub patch_size: Option<f64>,
+    /// Treat every surface as two-sided
+    #[arg(long)]
+    pub two_sided: bool,
+    /// Unit of the file's lengths
+    #[arg(long, value_enum, default_value = "m")]
+    pub unit: Unit,
+    /// Threads [default: all]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Say nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Units of length.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Unit {
+    /// Millimetres.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+}
+
+impl Unit {
+    /// Metres per unit.
+    pub fn metres(self) -> f64 {
+        match self {
+            Unit::Mm => 1e-3,
+            Unit::Cm => 1e-2,
+            Unit::M => 1.0,
+        }
+    }
+}
+
+/// A camera of the command line.
+#[derive(Debug, clap::Args)]
+pub struct ViewArgs {
+    /// Camera of the scene, by name or index [default: 0]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Place of the camera, in the scene's unit
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub eye: Option<[f64; 3]>,
+    /// Point the camera looks at
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub target: Option<[f64; 3]>,
+    /// Upwards
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view, degrees
+    #[arg(long, value_name = "DEGREES")]
+    pub fov: Option<f64>,
+}
+
+/// Settings of the solver.
+#[derive(Debug, clap::Args)]
+pub struct SolveArgs {
+    /// Rays to shoot, such as 5000000, 5e6 or 5M [default: 200 per patch]
+    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "time")]
+    pub rays: Option<u64>,
+    /// Seconds to shoot for
+    #[arg(long, value_name = "S")]
+    pub time: Option<f64>,
+    /// Seed of every random number
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// default: ours; paper: Kelemen et al. 2003, one ray per iteration, corrected as docs/paper.md says
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: Preset,
+    /// Which of a ray's two transfers count, and how
+    #[arg(long, value_enum, default_value = "balance")]
+    pub estimator: EstimatorArg,
+    /// What glossy patches remember of the direction of light
+    #[arg(long, value_enum, default_value = "both")]
+    pub representation: RepresentationArg,
+    /// Rays per iteration of the paper preset
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), default_value_t = 1)]
+    pub batch: u64,
+}
+
+/// Presets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// Ours.
+    Default,
+    /// The paper's.
+    Paper,
+}
+
+/// Estimators.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum EstimatorArg {
+    /// From the shooter to the hit only.
+    Forward,
+    /// From the hit to the shooter only.
+    Backward,
+    /// Both with half the weight.
+    Equal,
+    /// Both by the balance heuristic.
+    Balance,
+}
+
+/// Representations.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum RepresentationArg {
+    /// Direction-independent main part.
+    Main,
+    /// One accepted sample.
+    Sample,
+    /// Main part and one accepted sample of the difference BRDF.
+    Both,
+    /// Main part and the last sample, always accepted.
+    Last,
+}
+
+/// `twinray render`.
+#[derive(Debug, clap::Args)]
+pub struct RenderArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Camera.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Solver.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// Picture to write: .png, or .exr for linear radiance [default: SCENE.png in this folder]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Size of the picture in pixels [default: 512 high, as wide as the camera asks]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Camera rays per pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), default_value_t = 16)]
+    pub samples: u32,
+    /// Show the raw patches instead of smooth light
+    #[arg(long)]
+    pub flat: bool,
+    /// Exposure of PNGs: auto, or stops (EV) on radiance
+    #[arg(long, value_name = "auto|EV", default_value = "auto", allow_hyphen_values = true, value_parser = exposure)]
+    pub exposure: ExposureArg,
+    /// Tone curve of PNGs
+    #[arg(long, value_enum, default_value = "agx")]
+    pub tone: ToneArg,
+}
+
+/// Exposures.
+#[derive(Clone, Copy, Debug)]
+pub enum ExposureArg {
+    /// From the picture.
+    Auto,
+    /// Given stops.
+    Stops(f64),
+}
+
+/// Tone curves.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ToneArg {
+    /// AgX-like.
+    Agx,
+    /// Clip at 1.
+    None,
+}
+
+/// `twinray info`.
+#[derive(Debug, clap::Args)]
+pub struct InfoArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+}
+
+/// `twinray scene`.
+#[derive(Debug, clap::Args)]
+pub struct SceneArgs {
+    /// A built-in scene, or a file to convert; without it the built-in scenes are listed
+    pub scene: Option<String>,
+    /// File to write: .glb or .obj (with its .mtl and textures beside it)
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// A count that may be written as 5e6, 5M or 200k.
+fn count(text: &str) -> Result<u64, String> {
+    let (digits, factor) = match text.char_indices().last() {
+        Some((i, 'k' | 'K')) => (&text[..i], 1e3),
+        Some((i, 'M')) => (&text[..i], 1e6),
+        Some((i, 'G')) => (&text[..i], 1e9),
+        _ => (text, 1.0),
+    };
+    let value: f64 = digits.replace('_', "").parse().map_err(|_| "expected a count such as 5000000, 5e6 or 5M")?;
+    let value = value * factor;
+    if value >= 1.0 && value <= 1e15 { Ok(value.round() as u64) } else { Err("expected 1 to 1e15".into()) }
+}
+
+fn triple(text: &str) -> Result<[f64; 3], String> {
+    let expected = "expected three numbers such as 1.5,0,-2";
+    let numbers: Vec<f64> =
+        text.split(',').map(|t| t.trim().parse()).collect::<Result<_, _>>().map_err(|_| expected)?;
+    let triple: [f64; 3] = numbers.try_into().map_err(|_| expected)?;
+    if triple.iter().all(|x| x.is_finite()) { Ok(triple) } else { Err(expected.into()) }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let expected = "expected WIDTHxHEIGHT in pixels, such as 800x600, each 1 to 16384";
+    let (w, h) = text.split_once(['x', 'X', '×']).ok_or(expected)?;
+    let side = |s: &str| s.trim().parse().ok().filter(|n| (1..=16384).contains(n)).ok_or(expected);
+    Ok((side(w)?, side(h)?))
+}
+
+fn exposure(text: &str) -> Result<ExposureArg, String> {
+    if text == "auto" {
+        return Ok(ExposureArg::Auto);
+    }
+    let stops: f64 = text.parse().map_err(|_| "expected auto or a number of stops, such as -2.5")?;
+    if stops.is_finite() { Ok(ExposureArg::Stops(stops)) } else { Err("expected a finite number of stops".into()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn counts_and_sizes() {
+        assert_eq!(count("5e6"), Ok(5_000_000));
+        assert_eq!(count("5M"), Ok(5_000_000));
+        assert_eq!(count("78_443"), Ok(78_443));
+        assert!(count("-3").is_err() && count("nan").is_err() && count("").is_err());
+        assert_eq!(size("800x600"), Ok((800, 600)));
+        assert!(size("0x600").is_err() && size("800").is_err());
+        assert_eq!(triple("1,-2.5, 3"), Ok([1.0, -2.5, 3.0]));
+        assert!(triple("1,2").is_err() && triple("1,2,nan").is_err());
+    }
+}

@@ -1,0 +1,83 @@
+//! `twinray info`: what is in a scene, before anything is paid for.
+
+use anyhow::anyhow;
+use serde_json::json;
+use twinray::solve::{Params, Solver, state_bytes};
+
+use crate::args::InfoArgs;
+use crate::commands;
+use crate::failure::Ending;
+use crate::input;
+
+/// Rays of the short solve behind the power balance, and of the test for closedness.
+const PROBE_RAYS: u64 = 200_000;
+
+/// Runs the command.
+pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
+    commands::set_threads(args.load.threads);
+    let loaded = input::load(&args.load, None)?;
+    let patches = &loaded.patches;
+    let closedness = patches.closedness(PROBE_RAYS);
+    let mut solver =
+        Solver::new(patches, Params::default_preset(1), None).map_err(|e| anyhow!("{}: {e}", args.load.scene))?;
+    solver.run(PROBE_RAYS);
+    let balance = solver.solution().balance();
+    let mut warnings = loaded.warnings.clone();
+    warnings.extend(commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene)));
+
+    let glossy = patches.patches().filter(|&p| patches.is_glossy(p)).count();
+    let state = state_bytes(patches.len(), glossy);
+    let [kernel, constants] = patches.bytes();
+    let (low, high) = patches.bounding_box();
+    let size = high - low;
+    let power = patches.emitted_power();
+    let albedo = patches.mean_albedo();
+    let cameras: Vec<&str> = loaded.cameras.iter().map(|c| c.name.as_str()).collect();
+
+    if args.load.json {
+        let report = json!({
+            "scene": loaded.name,
+            "triangles": patches.triangle_count(),
+            "transmissive_triangles_left_out": patches.transmissive_triangles(),
+            "patches": patches.len(), "glossy_patches": glossy, "emitting_patches": patches.emitter_count(),
+            "area": patches.total_area(), "size": size.to_array(),
+            "emitted_power_rgb": power.to_array(), "mean_albedo_rgb": albedo.to_array(),
+            "environment": patches.environment().is_some(),
+            "shared_edges": closedness.shared_edges, "escaping_rays": closedness.escaping_rays,
+            "bytes": { "rays": kernel, "patches": constants, "solver": state },
+            "power": commands::balance_json(&balance),
+            "cameras": cameras,
+            "warnings": warnings,
+        });
+        println!("{report:#}");
+        return Ok(Ending::Done);
+    }
+    commands::print_warnings(&warnings, args.load.quiet);
+    let mb = |bytes: usize| format!("{:.1} MB", bytes as f64 * 1e-6);
+    println!("scene      {}", loaded.name);
+    println!("triangles  {}", patches.triangle_count());
+    if patches.transmissive_triangles() > 0 {
+        println!("           {} transmissive ones left out", patches.transmissive_triangles());
+    }
+    println!("patches    {} ({glossy} glossy, {} emitting)", patches.len(), patches.emitter_count());
+    println!("size       {:.4} x {:.4} x {:.4} m, area {:.4} m²", size.x, size.y, size.z, patches.total_area());
+    println!("emission   {:.6} {:.6} {:.6} W (R G B), Σ π A L", power.r, power.g, power.b);
+    println!("sky        {}", if patches.environment().is_some() { "yes" } else { "none" });
+    println!("albedo     {:.4} {:.4} {:.4} (area-weighted mean)", albedo.r, albedo.g, albedo.b);
+    println!(
+        "closed     {:.2} % of edges shared by two triangles; {:.3} % of rays escape",
+        100.0 * closedness.shared_edges,
+        100.0 * closedness.escaping_rays
+    );
+    println!(
+        "memory     {} (rays {}, patches {}, solver {} = {:.0} B a patch)",
+        mb(kernel + constants + state),
+        mb(kernel),
+        mb(constants),
+        mb(state),
+        state as f64 / patches.len() as f64
+    );
+    println!("cameras    {}", cameras.join(", "));
+    println!("{}", commands::balance_line(&balance));
+    Ok(Ending::Done)
+}

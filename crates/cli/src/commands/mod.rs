@@ -1,0 +1,54 @@
+//! One file a verb.
+
+pub mod info;
+pub mod render;
+pub mod scene;
+
+use serde_json::{Value, json};
+use twinray::solve::PowerBalance;
+
+/// Uses `threads` threads, or all.
+fn set_threads(threads: Option<u16>) {
+    if let Some(n) = threads {
+        // Fails only if a pool exists already; there is one command a process.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build_global();
+    }
+}
+
+fn print_warnings(warnings: &[String], quiet: bool) {
+    if !quiet {
+        warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    }
+}
+
+/// The share of light lost on backs beyond which the user is warned.
+const TOLERATED_LOSS: f64 = 1e-3;
+
+fn loss_warning(balance: &PowerBalance) -> Option<String> {
+    (balance.lost_share() > TOLERATED_LOSS).then(|| {
+        format!(
+            "{:.2} % of the light is lost on the backs of one-sided surfaces: turn them round, or use --two-sided",
+            100.0 * balance.lost_share()
+        )
+    })
+}
+
+fn balance_json(b: &PowerBalance) -> Value {
+    json!({
+        "emitted": b.emitted, "sky": b.sky, "absorbed": b.absorbed, "escaped": b.escaped, "lost": b.lost,
+        "residual": b.residual(),
+    })
+}
+
+fn balance_line(b: &PowerBalance) -> String {
+    let share = |x: f64| 100.0 * x / (b.emitted + b.sky);
+    format!(
+        "power: {:.6} emitted + {:.6} from the sky = {:.2} % absorbed + {:.2} % escaped + {:.3} % lost on backs (residual {:+.2} %)",
+        b.emitted,
+        b.sky,
+        share(b.absorbed),
+        share(b.escaped),
+        share(b.lost),
+        100.0 * b.residual()
+    )
+}

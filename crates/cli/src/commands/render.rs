@@ -1,0 +1,172 @@
+//! `twinray render`: solve a scene, take a picture, write it.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{anyhow, bail};
+use serde_json::json;
+use twinray::format;
+use twinray::render::{self, Exposure, Picture, PictureOptions, ToneCurve};
+use twinray::scene::Camera;
+use twinray::solve::{Estimator, Observer, Params, Representation, Schedule, Solver};
+
+use crate::args::{EstimatorArg, ExposureArg, Preset, RenderArgs, RepresentationArg, SolveArgs, ToneArg};
+use crate::failure::Ending;
+use crate::input::{self, Loaded};
+use crate::output::{Output, extension};
+use crate::progress::{Goal, Progress};
+use crate::{commands, interrupt};
+
+/// Rays per patch where the user does not say.
+const DEFAULT_RAYS_PER_PATCH: u64 = 200;
+/// Height of a picture where the user does not say.
+const DEFAULT_HEIGHT: u32 = 512;
+
+/// Runs the command.
+pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
+    let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
+    if !matches!(extension(&path).as_str(), "png" | "exr") {
+        bail!("{}: expected a name that ends in .png or .exr", path.display());
+    }
+    commands::set_threads(args.load.threads);
+    interrupt::install();
+    let start = Instant::now();
+    let loaded = input::load(&args.load, Some(&args.view))?;
+    let overridden = loaded.cameras.first().is_some_and(|c| c.name == "command line");
+    let camera = input::pick_camera(&loaded.cameras, args.view.camera.as_deref().filter(|_| !overridden))?;
+    let output = Output::open(&path)?;
+    commands::print_warnings(&loaded.warnings, args.load.quiet);
+    if !args.load.quiet {
+        eprintln!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
+    }
+    let loading = start.elapsed().as_secs_f64();
+
+    let goal = goal(&args.solve, loaded.patches.len())?;
+    let mut progress = Progress::new(goal, args.load.quiet);
+    let observer = Observer::new(&loaded.patches, camera);
+    let mut solver = Solver::new(&loaded.patches, params(&args.solve), Some(observer))
+        .map_err(|e| anyhow!("{}: {e}", args.load.scene))?;
+    let limit = if let Goal::Rays(n) = goal { n } else { u64::MAX };
+    while !progress.is_reached(solver.rays()) && !interrupt::requested() {
+        solver.advance(limit);
+        if progress.wants_update() {
+            progress.update(solver.rays(), solver.relative_error());
+        }
+    }
+    let interrupted = interrupt::requested();
+    progress.finish();
+    let solving = progress.seconds();
+
+    let start = Instant::now();
+    let solution = solver.solution();
+    let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
+    let options = PictureOptions { width, height, samples: args.samples, flat: args.flat };
+    let picture = render::render(&loaded.patches, &solution, camera, &options);
+    let exposure = match args.exposure {
+        ExposureArg::Auto => Exposure::Auto,
+        ExposureArg::Stops(ev) => Exposure::Stops(ev),
+    };
+    let factor = exposure.factor(&picture);
+    output.write(&encode(args, &loaded, &picture, factor, solution.rays(), &path))?;
+    let drawing = start.elapsed().as_secs_f64();
+
+    let balance = solution.balance();
+    let mut warnings = loaded.warnings.clone();
+    let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
+    commands::print_warnings(loss.as_slice(), args.load.quiet);
+    warnings.extend(loss);
+    let rate = solution.rays() as f64 / solving.max(1e-9);
+    if !args.load.quiet {
+        eprintln!("{}", commands::balance_line(&balance));
+        eprintln!(
+            "{}: {} rays in {solving:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
+            path.display(),
+            solution.rays(),
+            rate * 1e-6,
+            100.0 * solution.relative_error(),
+            args.solve.seed,
+            factor.log2(),
+        );
+    }
+    if args.load.json {
+        let report = json!({
+            "output": path.display().to_string(),
+            "scene": loaded.name, "camera": camera.name,
+            "triangles": loaded.patches.triangle_count(), "patches": loaded.patches.len(),
+            "rays": solution.rays(), "seed": args.solve.seed, "interrupted": interrupted,
+            "seconds": { "load": loading, "solve": solving, "picture": drawing },
+            "rays_per_second": rate,
+            "relative_error": solution.relative_error(),
+            "invalid_deposits": solution.invalid_deposits(),
+            "power": commands::balance_json(&balance),
+            "exposure_ev": factor.log2(),
+            "warnings": warnings,
+        });
+        println!("{report:#}");
+    }
+    Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+fn default_output(scene: &str) -> PathBuf {
+    let stem = Path::new(scene).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    PathBuf::from(format!("{stem}.png"))
+}
+
+fn default_size(camera: &Camera) -> (u32, u32) {
+    let aspect = camera.aspect.filter(|a| (0.05..=20.0).contains(a)).unwrap_or(4.0 / 3.0);
+    ((f64::from(DEFAULT_HEIGHT) * aspect).round() as u32, DEFAULT_HEIGHT)
+}
+
+fn goal(args: &SolveArgs, patches: usize) -> anyhow::Result<Goal> {
+    match (args.rays, args.time) {
+        (Some(n), _) => Ok(Goal::Rays(n)),
+        (None, Some(s)) if s > 0.0 && s.is_finite() => Ok(Goal::Seconds(s)),
+        (None, Some(s)) => bail!("--time {s}: expected a positive number of seconds"),
+        (None, None) => Ok(Goal::Rays(DEFAULT_RAYS_PER_PATCH * patches as u64)),
+    }
+}
+
+fn params(args: &SolveArgs) -> Params {
+    let preset = match args.preset {
+        Preset::Default => Params::default_preset(args.seed),
+        Preset::Paper => Params { schedule: Schedule::Paper { batch: args.batch }, ..Params::paper_preset(args.seed) },
+    };
+    Params {
+        estimator: match args.estimator {
+            EstimatorArg::Forward => Estimator::Forward,
+            EstimatorArg::Backward => Estimator::Backward,
+            EstimatorArg::Equal => Estimator::Equal,
+            EstimatorArg::Balance => Estimator::Balance,
+        },
+        representation: match args.representation {
+            RepresentationArg::Main => Representation::Main,
+            RepresentationArg::Sample => Representation::Sample,
+            RepresentationArg::Both => Representation::Both,
+            RepresentationArg::Last => Representation::Last,
+        },
+        ..preset
+    }
+}
+
+fn encode(args: &RenderArgs, loaded: &Loaded, picture: &Picture, factor: f64, rays: u64, path: &Path) -> Vec<u8> {
+    let image = &picture.image;
+    let software = concat!("twinray ", env!("CARGO_PKG_VERSION"));
+    // The same settings give the same bytes: no date, no path, no thread count.
+    let comment = format!(
+        "scene {}, {} patches, {rays} rays, seed {}, preset {:?}",
+        loaded.name,
+        loaded.patches.len(),
+        args.solve.seed,
+        args.solve.preset
+    );
+    let text = [("Software", software), ("Comment", comment.as_str())];
+    if extension(path) == "exr" {
+        return format::write_exr(image.width, image.height, &image.pixels, None, &text);
+    }
+    let curve = match args.tone {
+        ToneArg::Agx => ToneCurve::AgX,
+        ToneArg::None => ToneCurve::None,
+    };
+    let bytes = render::display::to_srgb8(picture, factor, curve);
+    format::write_png(image.width, image.height, &bytes, &text)
+}

@@ -1,0 +1,24 @@
+//! How the command ends: 0 done, 2 bad input, 130 interrupted with the result kept.
+
+use std::process::ExitCode;
+
+/// How a command that did not fail ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// All was done.
+    Done,
+    /// Ctrl-C: what there was has been written.
+    Interrupted,
+}
+
+/// The exit code; a failure is printed to standard error, the outermost reason first.
+pub fn exit_code(outcome: anyhow::Result<Ending>) -> ExitCode {
+    match outcome {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Interrupted) => ExitCode::from(130),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

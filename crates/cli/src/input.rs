@@ -1,0 +1,168 @@
+//! From a name on the command line to patches: reading, units, cameras, completion, cutting, warnings.
+
+use std::path::{Component, Path};
+
+use anyhow::{Context, anyhow, bail};
+use twinray::format::{self, Limits};
+use twinray::scene::brdf::MIN_ALPHA;
+use twinray::scene::complete::complete;
+use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, Surface, builtin};
+
+use crate::args::{LoadArgs, ViewArgs};
+
+/// Patches where neither the user nor the scene says how many.
+const DEFAULT_PATCHES: usize = 100_000;
+
+/// A scene ready to be solved.
+#[derive(Debug)]
+pub struct Loaded {
+    /// Its name.
+    pub name: String,
+    /// Its patches.
+    pub patches: PatchScene,
+    /// Cameras of the file, or the one that was chosen.
+    pub cameras: Vec<Camera>,
+    /// What was ignored or added, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a scene from a file, or builds the built-in one; warnings go to the second part.
+pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
+    let path = Path::new(name);
+    if let Some(scene) = builtin::by_name(name) {
+        return Ok((scene, Vec::new()));
+    }
+    if !path.exists() {
+        let names: Vec<_> = builtin::NAMES.iter().map(|(n, _)| *n).collect();
+        bail!("{name}: no such file, and no built-in scene of that name; built-in are {}", names.join(", "));
+    }
+    let bytes = std::fs::read(path).with_context(|| format!("{name}: cannot be read"))?;
+    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+    let mut resolver = |relative: &str| -> std::io::Result<Vec<u8>> {
+        // The readers refuse paths that leave the folder; a link or an odd component is refused here as well.
+        if Path::new(relative).components().any(|c| !matches!(c, Component::Normal(_) | Component::CurDir)) {
+            return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "outside the scene's folder"));
+        }
+        std::fs::read(folder.join(relative))
+    };
+    let reading = format::read_scene(name, &bytes, &mut resolver, &Limits::default()).map_err(|e| anyhow!("{e}"))?;
+    let faults = reading.scene.validate();
+    if let Some(fault) = faults.first() {
+        bail!("{name}: {fault} ({} faults in all)", faults.len());
+    }
+    Ok((reading.scene, reading.warnings.iter().map(ToString::to_string).collect()))
+}
+
+/// Loads a scene for solving, completed with a camera and light where it lacks them.
+pub fn load(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> {
+    let (mut scene, mut warnings) = read(&args.scene)?;
+    scale(&mut scene, args.unit.metres());
+    let wanted = view.map(|v| override_camera(&scene, v, args.unit.metres())).transpose()?.flatten();
+    let name = args.scene.as_str();
+    for addition in complete(&mut scene, wanted.as_ref(), args.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
+        warnings.push(format!("{name}: {addition}"));
+    }
+    warnings.extend(sharp_lobes(&scene).map(|w| format!("{name}: {w}")));
+    let budget = match (args.patches, args.patch_size) {
+        (Some(n), _) => PatchBudget::Count(n as usize),
+        (None, Some(size)) => PatchBudget::Size(size),
+        (None, None) => PatchBudget::Count(scene.suggested_patches.unwrap_or(DEFAULT_PATCHES)),
+    };
+    let options = PatchOptions { budget, two_sided: args.two_sided };
+    let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
+    let mut cameras = scene.cameras;
+    if let Some(camera) = wanted {
+        cameras.insert(0, camera);
+    }
+    Ok(Loaded { name: scene.name, patches, cameras, warnings })
+}
+
+/// Lengths of the file to metres.
+fn scale(scene: &mut Scene, metres: f64) {
+    if metres == 1.0 {
+        return;
+    }
+    for instance in &mut scene.instances {
+        instance.transform.matrix3 *= metres;
+        instance.transform.translation *= metres;
+    }
+    for camera in &mut scene.cameras {
+        camera.eye *= metres;
+        if let Projection::Orthographic { half_height } = &mut camera.projection {
+            *half_height *= metres;
+        }
+    }
+}
+
+/// The camera that `--eye` and its kin describe, starting from the scene's own; `None` without any of them.
+fn override_camera(scene: &Scene, view: &ViewArgs, metres: f64) -> anyhow::Result<Option<Camera>> {
+    if view.eye.is_none() && view.target.is_none() && view.up.is_none() && view.fov.is_none() {
+        return Ok(None);
+    }
+    let base = match (scene.cameras.is_empty(), view.eye.is_some() && view.target.is_some()) {
+        (false, _) => pick_camera(&scene.cameras, view.camera.as_deref())?.clone(),
+        (true, true) => Camera::look_at("command line", Vector::ZERO, Vector::ZERO, Vector::Y, 50.0),
+        (true, false) => bail!("the scene has no camera to change; give both --eye and --target"),
+    };
+    let mut camera = Camera { name: "command line".into(), ..base };
+    let target = view.target.map(|t| vector(t) * metres);
+    if let Some(eye) = view.eye {
+        camera.eye = vector(eye) * metres;
+    }
+    if let Some(target) = target {
+        camera.forward = target - camera.eye;
+        if camera.forward.length() == 0.0 {
+            bail!("--eye and --target are the same point; expected two different ones");
+        }
+    }
+    if let Some(up) = view.up {
+        camera.up = vector(up);
+    }
+    if let Some(fov) = view.fov {
+        if !(fov > 0.0 && fov < 180.0) {
+            bail!("--fov {fov}: expected more than 0 and less than 180 degrees");
+        }
+        camera.projection = Projection::Perspective { vertical_fov: fov.to_radians() };
+    }
+    Ok(Some(camera))
+}
+
+type Vector = glam::DVec3;
+
+fn vector(v: [f64; 3]) -> Vector {
+    Vector::from_array(v)
+}
+
+/// The camera of that name or index; the first without a wish.
+pub fn pick_camera<'a>(cameras: &'a [Camera], wish: Option<&str>) -> anyhow::Result<&'a Camera> {
+    let Some(wish) = wish else { return cameras.first().ok_or_else(|| anyhow!("the scene has no camera")) };
+    let by_name = cameras.iter().find(|c| c.name == wish);
+    let by_index = || wish.parse::<usize>().ok().and_then(|i| cameras.get(i));
+    by_name.or_else(by_index).ok_or_else(|| {
+        let names: Vec<_> = cameras.iter().enumerate().map(|(i, c)| format!("{i} \"{}\"", c.name)).collect();
+        anyhow!("--camera {wish}: no such camera; the scene has {}", names.join(", "))
+    })
+}
+
+/// Names the materials whose lobes are too sharp to live on patches.
+fn sharp_lobes(scene: &Scene) -> Option<String> {
+    let sharp: Vec<&str> = scene
+        .materials
+        .iter()
+        .filter(|m| match m.surface {
+            Surface::Lambertian { .. } => false,
+            Surface::MetallicRoughness { roughness, .. } => roughness * roughness < MIN_ALPHA * 0.999,
+            Surface::Phong { exponent, .. } => exponent > 2.0 / (MIN_ALPHA * MIN_ALPHA),
+        })
+        .map(|m| m.name.as_str())
+        .collect();
+    let shown = sharp.iter().take(6).map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", ");
+    (!sharp.is_empty()).then(|| {
+        format!(
+            "{} material(s) smoother than roughness {:.2} are blurred to it, since mirrors are not traced yet: {shown}{}",
+            sharp.len(),
+            MIN_ALPHA.sqrt(),
+            if sharp.len() > 6 { ", …" } else { "" }
+        )
+    })
+}

@@ -1,0 +1,105 @@
+//! How long work is told: a bar on a terminal, plain lines elsewhere, nothing when quiet. Always standard error.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
+
+/// Seconds between plain lines.
+const LINE_INTERVAL: f64 = 2.0;
+
+/// Until when a solve goes on.
+#[derive(Clone, Copy, Debug)]
+pub enum Goal {
+    /// A number of rays.
+    Rays(u64),
+    /// Seconds.
+    Seconds(f64),
+}
+
+/// Progress of one solve.
+#[derive(Debug)]
+pub struct Progress {
+    start: Instant,
+    goal: Goal,
+    shown: Shown,
+    last_line: f64,
+}
+
+#[derive(Debug)]
+enum Shown {
+    Nothing,
+    Lines,
+    Bar(ProgressBar),
+}
+
+impl Progress {
+    /// Starts the clock.
+    pub fn new(goal: Goal, quiet: bool) -> Self {
+        let shown = if quiet {
+            Shown::Nothing
+        } else if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(1000);
+            bar.set_style(ProgressStyle::with_template("{bar:30} {percent:>3}%  {msg}").expect("a fixed template"));
+            Shown::Bar(bar)
+        } else {
+            Shown::Lines
+        };
+        Self { start: Instant::now(), goal, shown, last_line: 0.0 }
+    }
+
+    /// Seconds since the start.
+    pub fn seconds(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    /// True once the goal is reached.
+    pub fn is_reached(&self, rays: u64) -> bool {
+        match self.goal {
+            Goal::Rays(n) => rays >= n,
+            Goal::Seconds(s) => self.seconds() >= s,
+        }
+    }
+
+    /// True if an update would be shown now: errors are not estimated for nobody.
+    pub fn wants_update(&self) -> bool {
+        match self.shown {
+            Shown::Nothing => false,
+            Shown::Lines => self.seconds() - self.last_line >= LINE_INTERVAL,
+            Shown::Bar(_) => true,
+        }
+    }
+
+    /// Tells how far the solve is.
+    pub fn update(&mut self, rays: u64, relative_error: f64) {
+        let seconds = self.seconds();
+        let rate = rays as f64 / seconds.max(1e-9);
+        let (share, left) = match self.goal {
+            Goal::Rays(n) => (rays as f64 / n as f64, n.saturating_sub(rays) as f64 / rate),
+            Goal::Seconds(s) => (seconds / s, (s - seconds).max(0.0)),
+        };
+        let message = format!(
+            "{} rays  {:.2} M/s  error ≈ {:.2} %  {} left",
+            HumanCount(rays),
+            rate * 1e-6,
+            100.0 * relative_error,
+            HumanDuration(Duration::from_secs_f64(left.min(1e9)))
+        );
+        match &self.shown {
+            Shown::Nothing => {}
+            Shown::Lines => eprintln!("{:3.0} %  {message}", 100.0 * share.min(1.0)),
+            Shown::Bar(bar) => {
+                bar.set_position((1000.0 * share.min(1.0)) as u64);
+                bar.set_message(message);
+            }
+        }
+        self.last_line = seconds;
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+}

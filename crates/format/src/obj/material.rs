@@ -1,0 +1,205 @@
+//! MTL materials to ours: Kd to Lambertian or Phong, Ke to emission, d below 1 to glass.
+//!
+//! Every material is two-sided, because OBJ has no notion of sides; emission is still that of the front, the side
+//! of the author's normals. Not here: text (`mtl`), pixels (`texture`).
+
+use std::collections::HashMap;
+
+use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Wrap};
+
+use super::mtl::{Entry, Map};
+use crate::context::Context;
+use crate::reflectance::Clamp;
+use crate::texture::Pictures;
+use crate::warning::name_list;
+
+/// Grey of surfaces whose material is not to be had.
+const MISSING_REFLECTANCE: f64 = 0.5;
+
+/// Turns entries into materials when faces use them.
+pub(super) struct Materials {
+    entries: Vec<Entry>,
+    by_name: HashMap<String, usize>,
+    /// Our index of each name in use; the empty name is "no material".
+    known: HashMap<String, usize>,
+    list: Vec<Material>,
+    pictures: Pictures,
+    files: HashMap<String, Option<usize>>,
+    clamp: Clamp,
+    /// Ks brought down so that no more light leaves than arrives.
+    dimmed: Vec<String>,
+    transmissive: Vec<String>,
+    unknown: Vec<String>,
+    from_ambient: bool,
+}
+
+impl Materials {
+    pub(super) fn new(entries: Vec<Entry>) -> Self {
+        // Of equal names the first counts: it is what the viewers show that look names up in order.
+        let mut by_name = HashMap::new();
+        for (i, entry) in entries.iter().enumerate() {
+            by_name.entry(entry.name.clone()).or_insert(i);
+        }
+        let lit = |colour: Option<Rgb>| colour.is_some_and(|c| c.max_channel() > 0.0);
+        let emits = entries.iter().any(|e| lit(e.emission) || e.emission_map.is_some());
+        // Files older than Ke say "light" in the name and put the radiance into Ka.
+        let from_ambient = !emits && entries.iter().any(|e| is_light(&e.name) && lit(e.ambient));
+        Self {
+            entries,
+            by_name,
+            known: HashMap::new(),
+            list: Vec::new(),
+            pictures: Pictures::default(),
+            files: HashMap::new(),
+            clamp: Clamp::default(),
+            dimmed: Vec::new(),
+            transmissive: Vec::new(),
+            unknown: Vec::new(),
+            from_ambient,
+        }
+    }
+
+    /// Our index of the material `name`.
+    pub(super) fn of(&mut self, context: &mut Context<'_>, name: Option<&str>) -> usize {
+        let key = name.unwrap_or_default();
+        if let Some(&index) = self.known.get(key) {
+            return index;
+        }
+        let entry = self.by_name.get(key).and_then(|&i| self.entries.get(i)).cloned();
+        let material = match entry {
+            Some(entry) => self.material(context, &entry),
+            None => {
+                if let Some(name) = name {
+                    self.unknown.push(name.to_owned());
+                }
+                let reflectance = Texel::constant(Rgb::grey(MISSING_REFLECTANCE));
+                let name = name.unwrap_or("no material").to_owned();
+                let surface = Surface::Lambertian { reflectance };
+                Material { name, surface, two_sided: true, ..Material::default() }
+            }
+        };
+        self.list.push(material);
+        self.known.insert(key.to_owned(), self.list.len() - 1);
+        self.list.len() - 1
+    }
+
+    /// Materials and pictures, after the warnings that concern many of them.
+    pub(super) fn finish(self, context: &mut Context<'_>) -> (Vec<Material>, Pictures) {
+        self.clamp.report(context);
+        let limit = context.limits.max_reflectance;
+        let mut report = |names: &[String], message: String| {
+            if !names.is_empty() {
+                context.sum_up("materials", format!("{message}: {}", name_list(names)));
+            }
+        };
+        report(&self.dimmed, format!("Ks brought down so that Kd + Ks is at most {limit}"));
+        report(&self.transmissive, "d below 1 lets light straight through, without refraction or tint".to_owned());
+        report(&self.unknown, format!("not found in any MTL file, {MISSING_REFLECTANCE} grey is used"));
+        if self.from_ambient {
+            let lights = self.list.iter().filter(|m| !m.emission.is_black());
+            let names: Vec<String> = lights.map(|m| m.name.clone()).collect();
+            report(&names, "no material has Ke; Ka is taken as the emission of those named light".to_owned());
+        }
+        (self.list, self.pictures)
+    }
+
+    fn material(&mut self, context: &mut Context<'_>, entry: &Entry) -> Material {
+        let mut emission = entry.emission.unwrap_or(Rgb::BLACK).map(|c| c.max(0.0));
+        if self.from_ambient && is_light(&entry.name) {
+            emission = entry.ambient.unwrap_or(Rgb::BLACK).map(|c| c.max(0.0));
+        }
+        let emission_texture = entry.emission_map.as_ref().and_then(|map| self.texture(context, map));
+        if emission.is_black() && emission_texture.is_some() {
+            emission = Rgb::WHITE;
+        }
+        let opacity = entry.opacity.unwrap_or(1.0);
+        let transmissive = opacity < 1.0;
+        if transmissive {
+            self.transmissive.push(entry.name.clone());
+        }
+        Material {
+            name: entry.name.clone(),
+            surface: self.surface(context, entry, emission),
+            emission,
+            emission_texture,
+            two_sided: true,
+            opacity: self.mask(context, entry),
+            transmissive,
+        }
+    }
+
+    fn surface(&mut self, context: &mut Context<'_>, entry: &Entry, emission: Rgb) -> Surface {
+        let limit = context.limits.max_reflectance;
+        let texture = entry.diffuse_map.as_ref().and_then(|map| self.texture(context, map));
+        // Without Kd: the picture as it is, black for lamps, grey otherwise.
+        let default = match (&texture, emission.is_black()) {
+            (Some(_), _) => Rgb::WHITE,
+            (None, true) => Rgb::grey(MISSING_REFLECTANCE),
+            (None, false) => Rgb::BLACK,
+        };
+        let mut diffuse = Texel { factor: entry.diffuse.unwrap_or(default), texture };
+        self.clamp.apply(&mut diffuse, &self.pictures, limit, &entry.name);
+
+        let (specular, exponent) = (entry.specular.unwrap_or(Rgb::BLACK), entry.exponent.unwrap_or(0.0));
+        // Illumination models 0 and 1 have no highlight, whatever Ks says.
+        let glossy = entry.illumination.is_none_or(|i| i >= 2.0) && specular.max_channel() > 0.0;
+        if !glossy || exponent.is_nan() || exponent <= 0.0 {
+            return Surface::Lambertian { reflectance: diffuse };
+        }
+        // Kd keeps its value, it is what authors see; Ks takes what is left of the energy.
+        let brightest = diffuse.texture.as_ref().map_or([1.0; 3], |t| self.pictures.brightest(t.image));
+        let room: [f64; 3] = std::array::from_fn(|c| (limit - diffuse.factor[c] * brightest[c]).max(0.0));
+        let kept = Rgb::from_array(std::array::from_fn(|c| specular[c].clamp(0.0, room[c])));
+        if kept != specular {
+            self.dimmed.push(entry.name.clone());
+        }
+        if kept.is_black() {
+            return Surface::Lambertian { reflectance: diffuse };
+        }
+        Surface::Phong { diffuse, specular: kept, exponent: exponent.min(1e6) }
+    }
+
+    /// `map_d` is read where it is the alpha of the base colour; other masks have no place in the scene's types.
+    fn mask(&mut self, context: &mut Context<'_>, entry: &Entry) -> Opacity {
+        match &entry.opacity_map {
+            Some(map) if entry.diffuse_map.as_ref().is_some_and(|d| d.file == map.file) => {
+                Opacity::Mask { cutoff: 0.5 }
+            }
+            Some(_) => {
+                let element = format!("material \"{}\"", entry.name);
+                context.warn(element, "map_d is ignored: it is not the alpha of map_Kd");
+                Opacity::Opaque
+            }
+            None => Opacity::Opaque,
+        }
+    }
+
+    fn texture(&mut self, context: &mut Context<'_>, map: &Map) -> Option<TextureRef> {
+        if !self.files.contains_key(&map.file) {
+            let picture = self.load(context, map);
+            self.files.insert(map.file.clone(), picture);
+        }
+        let image = self.files.get(&map.file).copied().flatten()?;
+        let wrap = [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
+        Some(TextureRef { image, wrap, nearest: false })
+    }
+
+    fn load(&mut self, context: &mut Context<'_>, map: &Map) -> Option<usize> {
+        let element = format!("texture \"{}\"", map.file.chars().take(200).collect::<String>());
+        let bytes = context.fetch(&element, &map.file).map_err(|error| error.without_place());
+        match bytes.and_then(|bytes| self.pictures.add(&map.file, &bytes, context.limits)) {
+            Ok((picture, remark)) => {
+                remark.into_iter().for_each(|r| context.warn(&element, r));
+                Some(picture)
+            }
+            Err(message) => {
+                context.warn(element, format!("{message}: materials that use it keep their colour alone"));
+                None
+            }
+        }
+    }
+}
+
+fn is_light(name: &str) -> bool {
+    name.to_ascii_lowercase().contains("light")
+}

@@ -1,0 +1,130 @@
+//! The text of an MTL file: material names and the values that have a meaning for light.
+//!
+//! Not here: what surfaces they become (`material`). Nothing in an MTL file ends the reading: a line that cannot
+//! be read is a warning, and the value keeps its default.
+
+use twinray_scene::Rgb;
+
+use super::Line;
+use crate::context::Context;
+use crate::error::FormatError;
+
+/// A material as written; `None` where the file says nothing.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Entry {
+    pub(super) name: String,
+    pub(super) ambient: Option<Rgb>,
+    pub(super) diffuse: Option<Rgb>,
+    pub(super) specular: Option<Rgb>,
+    pub(super) emission: Option<Rgb>,
+    pub(super) exponent: Option<f64>,
+    pub(super) opacity: Option<f64>,
+    pub(super) illumination: Option<f64>,
+    pub(super) diffuse_map: Option<Map>,
+    pub(super) emission_map: Option<Map>,
+    pub(super) opacity_map: Option<Map>,
+}
+
+/// A texture with those of its options that matter.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Map {
+    pub(super) file: String,
+    pub(super) clamp: bool,
+}
+
+/// Reads the MTL file `file`.
+pub(super) fn parse(context: &mut Context<'_>, file: &str, bytes: &[u8]) -> Result<Vec<Entry>, FormatError> {
+    let mut entries: Vec<Entry> = Vec::new();
+    let text = super::text(file, bytes, "an MTL file")?;
+    for line in super::lines(&text) {
+        if line.keyword.eq_ignore_ascii_case("newmtl") {
+            context.charge(size_of::<Entry>() as u64 * 2 + line.rest.len() as u64, "materials")?;
+            entries.push(Entry { name: line.rest.to_owned(), ..Entry::default() });
+            continue;
+        }
+        // Values before the first name belong to nothing.
+        let Some(entry) = entries.last_mut() else { continue };
+        if let Err(message) = set(context, file, entry, &line) {
+            context.warnings.push(file, format!("line {}", line.number), format!("{message}: ignored"));
+        }
+    }
+    Ok(entries)
+}
+
+fn set(context: &mut Context<'_>, file: &str, entry: &mut Entry, line: &Line<'_>) -> Result<(), String> {
+    let number = || line.numbers::<1>(file).map(|[v]| Some(v)).map_err(|e| e.without_place());
+    let map = |context: &mut Context<'_>| parse_map(context, file, line).map(Some);
+    match line.keyword.to_ascii_lowercase().as_str() {
+        "ka" => entry.ambient = colour(line)?,
+        "kd" => entry.diffuse = colour(line)?,
+        "ks" => entry.specular = colour(line)?,
+        "ke" => entry.emission = colour(line)?,
+        "ns" => entry.exponent = number()?,
+        "illum" => entry.illumination = number()?,
+        // `d` wins over `Tr`, its complement: files that give both often have the latter wrong.
+        "d" => entry.opacity = line.numbers::<1>(file).map(|[v]| Some(v)).or_else(|_| halo(line))?,
+        "tr" if entry.opacity.is_none() => entry.opacity = number()?.map(|v| 1.0 - v),
+        "map_kd" => entry.diffuse_map = map(context)?,
+        "map_ke" => entry.emission_map = map(context)?,
+        "map_d" => entry.opacity_map = map(context)?,
+        _ => {}
+    }
+    Ok(())
+}
+
+/// `d -halo 0.5`: an opacity that depends on the angle; its constant is taken.
+fn halo(line: &Line<'_>) -> Result<Option<f64>, String> {
+    let value = line.rest.strip_prefix("-halo").and_then(|v| v.trim().parse::<f64>().ok());
+    value.map(Some).ok_or_else(|| "found no number".to_owned())
+}
+
+/// One number for grey or three for RGB; other spaces are not known.
+fn colour(line: &Line<'_>) -> Result<Option<Rgb>, String> {
+    let words: Vec<&str> = line.rest.split_ascii_whitespace().take_while(|w| !w.starts_with('#')).collect();
+    let numbers: Option<Vec<f64>> = words.iter().map(|w| w.parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    match numbers.as_deref() {
+        Some(&[grey]) => Ok(Some(Rgb::grey(grey))),
+        Some(&[r, g, b, ..]) => Ok(Some(Rgb::new(r, g, b))),
+        _ => Err(format!("found {:?}, expected three numbers", line.rest.chars().take(40).collect::<String>())),
+    }
+}
+
+/// `map_Kd -clamp on -o 0 0 0 wood floor.png`: options first, then a name that may contain spaces.
+fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<Map, String> {
+    let (mut rest, mut clamp) = (line.rest, false);
+    while let Some(option) = rest.strip_prefix('-').and_then(|r| r.split_ascii_whitespace().next()) {
+        rest = rest[1 + option.len()..].trim_start();
+        let mut word = || {
+            let word = rest.split_ascii_whitespace().next().unwrap_or_default();
+            rest = rest[word.len()..].trim_start();
+            word
+        };
+        match option {
+            "clamp" => clamp = word() == "on",
+            "blendu" | "blendv" | "cc" | "imfchan" | "type" | "texres" | "boost" | "bm" | "colorspace" => {
+                word();
+            }
+            "mm" => {
+                word();
+                word();
+            }
+            "o" | "s" | "t" => {
+                // One to three numbers.
+                for _ in 0..3 {
+                    let next = rest.split_ascii_whitespace().next().unwrap_or_default();
+                    if next.parse::<f64>().is_err() {
+                        break;
+                    }
+                    rest = rest[next.len()..].trim_start();
+                }
+                let place = format!("line {}", line.number);
+                context.warnings.push(file, place, format!("option -{option} of {} is ignored", line.keyword));
+            }
+            other => return Err(format!("unknown option -{}", other.chars().take(20).collect::<String>())),
+        }
+    }
+    if rest.is_empty() {
+        return Err("found no file name".to_owned());
+    }
+    Ok(Map { file: rest.to_owned(), clamp })
+}

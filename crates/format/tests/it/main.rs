@@ -1,0 +1,14 @@
+//! What the crate promises, one module per promise: features, faults, round trips, pictures, real and bad files.
+
+mod corpus;
+mod gltf_faults;
+mod gltf_geometry;
+mod gltf_material;
+mod gltf_nodes;
+mod limits;
+mod mutation;
+mod obj;
+mod pictures;
+mod real;
+mod round_trip;
+mod support;
