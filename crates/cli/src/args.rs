@@ -182,12 +182,24 @@ pub struct RenderArgs {
     /// Show the raw patches instead of smooth light
     #[arg(long)]
     pub flat: bool,
+    /// Reflections in glossy surfaces: traced per pixel, or as the patches remember them
+    #[arg(long, value_enum, default_value = "traced")]
+    pub lobes: LobesArg,
     /// Exposure of PNGs: auto, or stops (EV) on radiance
     #[arg(long, value_name = "auto|EV", default_value = "auto", allow_hyphen_values = true, value_parser = exposure)]
     pub exposure: ExposureArg,
     /// Tone curve of PNGs
     #[arg(long, value_enum, default_value = "agx")]
     pub tone: ToneArg,
+}
+
+/// Reflections.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum LobesArg {
+    /// One ray per camera ray.
+    Traced,
+    /// From the patches alone.
+    Patches,
 }
 
 /// Exposures.

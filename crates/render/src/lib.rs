@@ -12,4 +12,4 @@ mod reconstruct;
 
 pub use display::{Exposure, ToneCurve};
 pub use image::Image;
-pub use picture::{Picture, PictureOptions, render};
+pub use picture::{Lobes, Picture, PictureOptions, render};

@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use twinray_scene::brdf::Brdf;
 use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
@@ -26,11 +27,24 @@ pub struct PictureOptions {
     pub samples: u32,
     /// Show the raw patches instead of smooth light.
     pub flat: bool,
+    /// How the lobes of glossy surfaces are shown; `flat` always shows what the patches remember.
+    pub lobes: Lobes,
+}
+
+/// Where the light in a lobe comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lobes {
+    /// All from the patches: what each hit sent to the eye. No finer than the cells.
+    Patches,
+    /// Light straight from emitters from the patches (a ray would seldom meet a lamp, and then too brightly), all
+    /// other by one ray into the lobe per camera ray, which takes the solution's light where it ends.
+    #[default]
+    Traced,
 }
 
 impl Default for PictureOptions {
     fn default() -> Self {
-        Self { width: 640, height: 480, samples: 16, flat: false }
+        Self { width: 640, height: 480, samples: 16, flat: false, lobes: Lobes::Traced }
     }
 }
 
@@ -55,6 +69,8 @@ const MOST_BACKS: u32 = 16;
 /// Takes a picture of `solution`. The glossy part is that of the observer which the solver was given.
 pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options: &PictureOptions) -> Picture {
     let reconstruction = Reconstruction::new(scene, solution);
+    let traced = !options.flat && options.lobes == Lobes::Traced && solution.splits_direct_light();
+    let view = View { scene, reconstruction, flat: options.flat, traced };
     let aspect = f64::from(options.width) / f64::from(options.height);
     let rows: Vec<(Vec<Pixel>, Light)> = (0..options.height)
         .into_par_iter()
@@ -69,7 +85,7 @@ pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options:
                         let (origin, direction) =
                             camera.ray(px / f64::from(options.width), py / f64::from(options.height), aspect);
                         let (reflected, direct) =
-                            seen(scene, &reconstruction, options, origin - scene.centre(), direction, &mut light);
+                            view.seen(origin - scene.centre(), direction, lobe_numbers(options, x, y, k), &mut light);
                         sum += reflected + direct;
                         lights += direct;
                         covered += if direct.is_black() { 0.0 } else { 1.0 };
@@ -129,31 +145,68 @@ impl Light {
     }
 }
 
-/// Reflected and directly emitted radiance of what a camera ray meets.
-fn seen(
-    scene: &PatchScene,
-    reconstruction: &Reconstruction,
-    options: &PictureOptions,
-    origin: DVec3,
-    direction: DVec3,
-    light: &mut Light,
-) -> (Rgb, Rgb) {
-    light.rays += 1;
-    let Some((hit, patch)) = first_side(scene, origin, direction) else {
-        light.empty += 1;
-        return (Rgb::BLACK, scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction)));
-    };
-    let smooth = if options.flat { reconstruction.flat(patch) } else { reconstruction.smooth(patch, &hit) };
-    let brdf = scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v));
-    let cosine = scene.normal(patch).dot(-direction).max(0.0);
-    let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
-    // The lobe of a single patch may be negative in the paper's representation; a picture never is.
-    let reflected = (smooth.irradiance * brdf.base_reflectance(cosine) / PI + smooth.lobe).map(|c| c.max(0.0));
-    if emitted.is_black() && reflected.luminance() > 0.0 {
-        light.lit += 1;
-        light.log2_sum += libm::log2(reflected.luminance());
+/// Numbers for a camera ray's ray into the lobe: even over the pixel's samples.
+fn lobe_numbers(options: &PictureOptions, x: u32, y: u32, k: u32) -> [f64; 2] {
+    let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
+    let mut shift = Stream::new(0, 0x10BE, pixel);
+    let n = f64::from(options.samples);
+    let stratum = (f64::from(k) + 0.5) / n + shift.uniform();
+    [stratum.fract(), (f64::from(k) * 0.618_033_988_749_894_9 + shift.uniform()).fract()]
+}
+
+/// What camera rays look at.
+struct View<'a> {
+    scene: &'a PatchScene,
+    reconstruction: Reconstruction<'a>,
+    flat: bool,
+    traced: bool,
+}
+
+impl View<'_> {
+    /// Reflected and directly emitted radiance of what a camera ray meets.
+    fn seen(&self, origin: DVec3, direction: DVec3, u: [f64; 2], light: &mut Light) -> (Rgb, Rgb) {
+        let scene = self.scene;
+        light.rays += 1;
+        let Some((hit, patch)) = first_side(scene, origin, direction) else {
+            light.empty += 1;
+            return (Rgb::BLACK, scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction)));
+        };
+        let smooth = if self.flat { self.reconstruction.flat(patch) } else { self.reconstruction.smooth(patch, &hit) };
+        let brdf = scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v));
+        let cosine = scene.normal(patch).dot(-direction).max(0.0);
+        let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
+        let lobe = match self.traced && brdf.is_glossy() {
+            true => smooth.lobe[0] + self.lobe_ray(&hit, patch, &brdf, -direction, u),
+            false => smooth.lobe[0] + smooth.lobe[1],
+        };
+        // The lobe of a single patch may be negative in the paper's representation; a picture never is.
+        let reflected = (smooth.irradiance * brdf.base_reflectance(cosine) / PI + lobe).map(|c| c.max(0.0));
+        if emitted.is_black() && reflected.luminance() > 0.0 {
+            light.lit += 1;
+            light.log2_sum += libm::log2(reflected.luminance());
+        }
+        (reflected, emitted)
     }
-    (reflected, emitted)
+
+    /// One sample of the lobe's reflection of everything but emitting patches.
+    fn lobe_ray(&self, hit: &SurfaceHit, patch: PatchId, brdf: &Brdf, wo: DVec3, u: [f64; 2]) -> Rgb {
+        let scene = self.scene;
+        let geometric = scene.normal(patch);
+        // Reflections follow the shading normal, as long as the ray stays above the surface.
+        let smooth = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+        let n = if smooth.dot(wo) > 0.0 { smooth } else { geometric };
+        let Some(wi) = brdf.lobe_sample(n, wo, u).filter(|wi| geometric.dot(*wi) > 0.0) else { return Rgb::BLACK };
+        let weight = brdf.lobe_eval(n, wi, wo) * (n.dot(wi) / brdf.lobe_pdf(n, wo, wi));
+        let point = scene.point_of(hit.triangle, hit.u, hit.v);
+        let Some(far) = scene.trace_from(patch, point, wi) else {
+            return weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi));
+        };
+        let Some(there) = scene.patch_of(&far) else { return Rgb::BLACK };
+        let brdf = scene.brdf_of(far.triangle, scene.color_at(far.triangle, far.u, far.v));
+        // What the far end reflects, its own lobe as if it were diffuse.
+        let light = self.reconstruction.smooth(there, &far).irradiance * brdf.mean_albedo() / PI;
+        weight * light
+    }
 }
 
 /// The first side that scatters: one-sided surfaces are not seen from behind, as glTF has it.

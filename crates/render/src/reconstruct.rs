@@ -3,7 +3,7 @@
 //! At a point x, irradiance is a weighted mean over nearby cells of the same surface: a compact kernel of the
 //! distance, times the cell's area and visible share, faded out where normals turn or a step leads off the tangent
 //! plane. Only cells that the point's own cell can see take part, so that nothing passes a wall. The weights vary
-//! continuously with x: no facets. Neighbours are found once per cell, when a pixel first needs them.
+//! continuously with x: no facets. Cells are looked at when a pixel first needs them.
 
 use std::sync::OnceLock;
 
@@ -16,25 +16,28 @@ use crate::grid::Grid;
 
 /// Radius of the kernel over the side of a typical cell: about ten cells share a point.
 const RADIUS: f64 = 1.9;
+/// Where triangles are smaller than cells, the kernel shrinks to about so many.
+const CELLS_IN_KERNEL: usize = 40;
+/// The most neighbours of a cell: those within the kernel of any of its points.
+const MOST_NEIGHBOURS: usize = 96;
 /// Cosine between normals below which surfaces are not the same.
 const SAME_NORMAL: f64 = 0.8;
 /// Rise over run off the tangent plane beyond which surfaces are not the same.
 const SAME_PLANE: f64 = 0.35;
-/// The most neighbours of a cell: the nearest are kept where triangles are smaller than cells.
-const MOST_NEIGHBOURS: usize = 48;
-/// Points at which a cell is tested for what covers it.
-const COVER_TESTS: u32 = 8;
+/// Points at which a suspicious cell is tested for what covers it.
+const COVER_TESTS: u32 = 24;
+/// Cells of which less than this share is free say too little of their light.
+const LEAST_SHARE: f64 = 0.2;
 
-/// A neighbour of a cell, itself included.
+/// What the display needs to know of a cell.
 #[derive(Clone, Copy, Debug)]
-struct Neighbour {
-    centre: DVec3,
+struct Cell {
+    /// A free point of the cell: its centre, unless something stands on that.
+    origin: DVec3,
     normal: DVec3,
-    radius_squared: f64,
-    weight: f64,
-    irradiance: Rgb,
-    /// Radiance of the lobe to the eye, where the material is the same.
-    lobe: Option<Rgb>,
+    /// Share of the cell that its origin can see: the rest gets no light and would show as a dark rim.
+    share: f64,
+    radius: f64,
 }
 
 /// Reconstructed light at a point.
@@ -42,8 +45,8 @@ struct Neighbour {
 pub struct Smooth {
     /// Irradiance, W·m⁻².
     pub irradiance: Rgb,
-    /// Radiance of the lobe towards the observer.
-    pub lobe: Rgb,
+    /// Radiance of the lobe towards the observer: of direct light, and of all other light.
+    pub lobe: [Rgb; 2],
 }
 
 /// Reconstruction over all cells of a scene.
@@ -54,8 +57,8 @@ pub struct Reconstruction<'a> {
     centres: Vec<DVec3>,
     typical_size: f64,
     grid: Grid,
-    neighbours: Vec<OnceLock<Box<[Neighbour]>>>,
-    visible_share: Vec<OnceLock<f64>>,
+    cells: Vec<OnceLock<Cell>>,
+    neighbours: Vec<OnceLock<Box<[PatchId]>>>,
 }
 
 impl<'a> Reconstruction<'a> {
@@ -70,8 +73,8 @@ impl<'a> Reconstruction<'a> {
             grid: Grid::new(RADIUS * typical_size, &centres),
             centres,
             typical_size,
+            cells: (0..scene.len()).map(|_| OnceLock::new()).collect(),
             neighbours: (0..scene.len()).map(|_| OnceLock::new()).collect(),
-            visible_share: (0..scene.len()).map(|_| OnceLock::new()).collect(),
         }
     }
 
@@ -79,119 +82,138 @@ impl<'a> Reconstruction<'a> {
     pub fn smooth(&self, patch: PatchId, hit: &SurfaceHit) -> Smooth {
         let x = self.scene.point_of(hit.triangle, hit.u, hit.v);
         let n = self.scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
-        let (mut irradiance, mut lobe) = (Rgb::BLACK, Rgb::BLACK);
+        let glossy = self.scene.is_glossy(patch);
+        let material = self.scene.material(patch) as *const _;
+        let mut sum = Smooth { irradiance: Rgb::BLACK, lobe: [Rgb::BLACK; 2] };
         let (mut total, mut lobe_total) = (0.0, 0.0);
-        for d in self.neighbours(patch) {
-            let offset = d.centre - x;
+        for &other in self.neighbours(patch) {
+            let cell = self.cell(other);
+            let offset = cell.origin - x;
             let distance_squared = offset.length_squared();
-            let kernel = 1.0 - distance_squared / d.radius_squared;
+            let kernel = 1.0 - distance_squared / (cell.radius * cell.radius);
             if kernel <= 0.0 {
                 continue;
             }
-            let rise = offset.dot(d.normal).abs().max(offset.dot(n).abs()) / distance_squared.sqrt().max(1e-12);
+            let rise = offset.dot(cell.normal).abs().max(offset.dot(n).abs()) / distance_squared.sqrt().max(1e-12);
             let plane = fade(SAME_PLANE - rise, 0.15);
-            let turn = fade(n.dot(d.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
-            let weight = kernel * kernel * plane * turn * d.weight;
-            irradiance += d.irradiance * weight;
+            let turn = fade(n.dot(cell.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
+            // A cell that is half covered says less, and says it with the error of its share.
+            let trust = self.scene.area(other) * cell.share * cell.share * cell.share;
+            let weight = kernel * kernel * plane * turn * trust;
+            sum.irradiance += self.solution.irradiance(other) * (weight / cell.share);
             total += weight;
-            if let Some(l) = d.lobe {
-                lobe += l * weight;
+            if glossy
+                && let Some(lobe) = self.solution.observed_lobe(other)
+                && std::ptr::eq(self.scene.material(other), material)
+            {
+                sum.lobe[0] += lobe[0] * (weight / cell.share);
+                sum.lobe[1] += lobe[1] * (weight / cell.share);
                 lobe_total += weight;
             }
         }
-        if total <= 1e-12 {
-            return self.flat(patch);
-        }
-        let lobe = if lobe_total > 0.0 { lobe / lobe_total } else { self.flat(patch).lobe };
-        Smooth { irradiance: irradiance / total, lobe }
+        let own = self.flat(patch);
+        let irradiance = if total > 0.0 { sum.irradiance / total } else { own.irradiance };
+        let lobe = if lobe_total > 0.0 { sum.lobe.map(|l| l / lobe_total) } else { own.lobe };
+        Smooth { irradiance, lobe }
     }
 
     /// Light of the patch itself.
     pub fn flat(&self, patch: PatchId) -> Smooth {
         Smooth {
             irradiance: self.solution.irradiance(patch),
-            lobe: self.solution.observed_lobe(patch).unwrap_or(Rgb::BLACK),
+            lobe: self.solution.observed_lobe(patch).unwrap_or([Rgb::BLACK; 2]),
         }
     }
 
-    fn neighbours(&self, patch: PatchId) -> &[Neighbour] {
-        self.neighbours[patch.index()].get_or_init(|| self.find_neighbours(patch))
+    fn neighbours(&self, patch: PatchId) -> &[PatchId] {
+        self.neighbours[patch.index()].get_or_init(|| {
+            let here = self.cell(patch);
+            let reach = here.radius + 1.2 * self.typical_size.max(self.scene.area(patch).sqrt());
+            let mut near = self.same_surface(patch, reach);
+            near.truncate(MOST_NEIGHBOURS);
+            near.retain(|&other| {
+                self.cell(other).share >= LEAST_SHARE
+                    && (other == patch || self.sees(here.origin, here.normal, other, self.cell(other).origin))
+            });
+            near.into_boxed_slice()
+        })
     }
 
-    fn find_neighbours(&self, patch: PatchId) -> Box<[Neighbour]> {
-        let scene = self.scene;
-        let (x, n, shading) = (self.centres[patch.index()], scene.normal(patch), self.normal_at_centre(patch));
-        // The kernel reaches as far as its cells are large; a point may be a cell's size away from its centre.
-        let reach = (RADIUS + 1.2) * self.typical_size.max(scene.area(patch).sqrt());
-        let material = scene.material(patch) as *const _;
-        let mut found: Vec<(f64, PatchId)> = Vec::new();
-        for other in self.grid.near(x, reach) {
-            let offset = self.centres[other.index()] - x;
-            let distance = offset.length();
-            let normal = self.normal_at_centre(other);
-            let rise = offset.dot(normal).abs().max(offset.dot(shading).abs());
-            if distance > reach || shading.dot(normal) < SAME_NORMAL - 0.1 || rise > 1.5 * SAME_PLANE * distance {
-                continue;
-            }
-            found.push((distance, other));
-        }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        found.truncate(MOST_NEIGHBOURS);
-        let mut list: Vec<Neighbour> = found
-            .into_iter()
-            .filter_map(|(_, other)| {
-                let centre = self.centres[other.index()];
-                // Look from a little above the surface: on curved ones the chord runs below it.
-                let lift = 0.05 * self.typical_size;
-                let (from, to) = (x + shading * lift, centre + self.normal_at_centre(other) * lift);
-                if other != patch && !scene.visible(from, n, to, scene.normal(other)) {
-                    return None;
-                }
-                let share = self.visible_share(other);
-                if share < 0.25 {
-                    return None;
-                }
-                let same_material = std::ptr::eq(scene.material(other), material);
-                let area = scene.area(other);
-                Some(Neighbour {
-                    centre,
-                    normal: self.normal_at_centre(other),
-                    radius_squared: (RADIUS * self.typical_size.max(area.sqrt())).powi(2),
-                    weight: area * share * share,
-                    irradiance: self.solution.irradiance(other) / share,
-                    lobe: self.solution.observed_lobe(other).filter(|_| same_material).map(|l| l / share),
-                })
+    /// Cells within `reach` whose normals and places fit the surface of `patch`, nearest first.
+    fn same_surface(&self, patch: PatchId, reach: f64) -> Vec<PatchId> {
+        let (x, n) = (self.centres[patch.index()], self.normal(patch));
+        let mut found: Vec<(f64, PatchId)> = self
+            .grid
+            .near(x, reach)
+            .filter_map(|other| {
+                let offset = self.centres[other.index()] - x;
+                let (distance, normal) = (offset.length(), self.normal(other));
+                let rise = offset.dot(normal).abs().max(offset.dot(n).abs());
+                let fits =
+                    distance <= reach && n.dot(normal) > SAME_NORMAL - 0.1 && rise <= 1.5 * SAME_PLANE * distance;
+                fits.then_some((distance, other))
             })
             .collect();
-        list.shrink_to_fit();
-        list.into_boxed_slice()
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.into_iter().map(|(_, p)| p).collect()
     }
 
-    fn normal_at_centre(&self, patch: PatchId) -> DVec3 {
-        // Vertex normals at the cell's centre; the hit's own are interpolated the same way.
-        let scene = self.scene;
-        let [u, v] = scene.cell_place(patch);
-        scene.shading_normal(scene.triangle_of(patch), scene.side_of(patch), u, v)
+    /// True if a point over a surface sees a point of another cell, both lifted a little: on curved surfaces the
+    /// chord runs below the surface by a part of the rise.
+    fn sees(&self, from: DVec3, normal: DVec3, other: PatchId, to: DVec3) -> bool {
+        let there = self.normal(other);
+        let offset = to - from;
+        let rise = offset.dot(normal).abs().max(offset.dot(there).abs());
+        let lift = 0.03 * self.typical_size + 0.3 * rise;
+        self.scene.visible(from + normal * lift, normal, to + there * lift, there)
     }
 
-    /// The share of a cell that nothing stands on: rays along the normal that meet no back and nothing close by.
-    /// The rest of the cell gets no light and would show as a dark rim.
-    fn visible_share(&self, patch: PatchId) -> f64 {
-        *self.visible_share[patch.index()].get_or_init(|| {
-            let scene = self.scene;
-            let (n, touching) = (scene.normal(patch), 0.02 * self.typical_size);
-            let mut free = 0;
-            for k in 0..COVER_TESTS {
-                let (s, t) =
-                    ((f64::from(k) * 0.754_877_666 + 0.5).fract(), (f64::from(k) * 0.569_840_29 + 0.5).fract());
-                let point = scene.cell_point(patch, s, t);
-                let covered = scene
-                    .trace_from(patch, point, n)
-                    .is_some_and(|hit| hit.t < touching || (hit.side == Side::Back && scene.patch_of(&hit).is_none()));
-                free += u32::from(!covered);
+    fn cell(&self, patch: PatchId) -> &Cell {
+        self.cells[patch.index()].get_or_init(|| {
+            let centre = self.centres[patch.index()];
+            let normal = self.normal(patch);
+            let widest = RADIUS * self.typical_size.max(self.scene.area(patch).sqrt());
+            let near = self.same_surface(patch, widest);
+            let radius = near.get(CELLS_IN_KERNEL).map_or(widest, |p| self.centres[p.index()].distance(centre));
+            let whole = Cell { origin: centre, normal, share: 1.0, radius };
+            let witnesses: Vec<PatchId> = near.into_iter().filter(|&p| p != patch).take(12).collect();
+            let seen_from = |point: DVec3| {
+                witnesses.iter().filter(|&&w| self.sees(point, normal, w, self.centres[w.index()])).count()
+            };
+            let corners = (1..=4).map(|k| self.spread_point(patch, k));
+            if !self.covered(patch, centre)
+                && seen_from(centre) * 6 >= witnesses.len() * 5
+                && corners.into_iter().all(|c| !self.covered(patch, c) && self.sees(centre, normal, patch, c))
+            {
+                return whole;
             }
-            f64::from(free) / f64::from(COVER_TESTS)
+            // Something stands on the cell: look from the point that sees most of its neighbours.
+            let points: Vec<DVec3> = (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).collect();
+            let free: Vec<DVec3> = points.iter().copied().filter(|&p| !self.covered(patch, p)).collect();
+            let best = free.iter().copied().map(|p| (seen_from(p), p)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+            let Some((_, origin)) = best else { return Cell { share: 0.0, ..whole } };
+            let seen = free.iter().filter(|&&p| p == origin || self.sees(origin, normal, patch, p)).count();
+            Cell { origin, share: seen as f64 / points.len() as f64, ..whole }
         })
+    }
+
+    /// True if nothing can light the point: along the normal it meets a back, or something that touches it.
+    fn covered(&self, patch: PatchId, point: DVec3) -> bool {
+        let scene = self.scene;
+        scene.trace_from(patch, point, scene.normal(patch)).is_some_and(|hit| {
+            hit.t < 0.02 * self.typical_size || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
+        })
+    }
+
+    fn spread_point(&self, patch: PatchId, k: u32) -> DVec3 {
+        let place = |step: f64| (f64::from(k) * step + 0.5).fract();
+        self.scene.cell_point(patch, place(0.754_877_666), place(0.569_840_29))
+    }
+
+    /// Vertex normals at the cell's centre: a hit's own are interpolated the same way.
+    fn normal(&self, patch: PatchId) -> DVec3 {
+        let [u, v] = self.scene.cell_place(patch);
+        self.scene.shading_normal(self.scene.triangle_of(patch), self.scene.side_of(patch), u, v)
     }
 }
 

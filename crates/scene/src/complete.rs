@@ -76,6 +76,8 @@ struct Surroundings {
     behind: f64,
     /// Mean distance to what is met, and the direction with the widest view.
     openness: f64,
+    /// Distance that only one direction in ten falls short of.
+    clearance: f64,
     view: DVec3,
 }
 
@@ -84,6 +86,7 @@ fn look_around(patches: &PatchScene, point: DVec3, directions: u64) -> Surroundi
     let (mut met, mut behind, mut openness) = (0.0, 0.0, 0.0);
     // Horizontal sectors, weighted towards a level gaze.
     let mut sectors = [0.0; 16];
+    let mut distances = Vec::new();
     for _ in 0..directions {
         let d = warp::uniform_sphere([stream.uniform(), stream.uniform()]);
         let Some(hit) = patches.trace(point, d) else { continue };
@@ -93,6 +96,7 @@ fn look_around(patches: &PatchScene, point: DVec3, directions: u64) -> Surroundi
             continue;
         }
         openness += hit.t;
+        distances.push(hit.t);
         let sector = ((d.z.atan2(d.x) / std::f64::consts::TAU + 0.5) * 16.0).clamp(0.0, 15.0) as usize;
         if d.y.abs() < 0.5 {
             sectors[sector] += hit.t;
@@ -103,7 +107,15 @@ fn look_around(patches: &PatchScene, point: DVec3, directions: u64) -> Surroundi
     let best = (0..16).max_by(|&a, &b| width(a).total_cmp(&width(b))).unwrap_or(0);
     let (sin, cos) = libm::sincos(((best as f64 + 0.5) / 16.0 - 0.5) * std::f64::consts::TAU);
     let n = directions as f64;
-    Surroundings { enclosed: met / n, behind: behind / n, openness: openness / n, view: DVec3::new(cos, -0.08, sin) }
+    distances.sort_by(f64::total_cmp);
+    let clearance = distances.get(distances.len() / 10).copied().unwrap_or(0.0);
+    Surroundings {
+        enclosed: met / n,
+        behind: behind / n,
+        openness: openness / n,
+        clearance,
+        view: DVec3::new(cos, -0.08, sin),
+    }
 }
 
 /// A camera for a scene without one.
@@ -120,7 +132,7 @@ pub fn choose_camera(patches: &PatchScene) -> Camera {
                 let p = DVec3::new(low.x + size.x * place(i), eye_level(y), low.z + size.z * place(j));
                 let around = look_around(patches, p, 256);
                 if around.enclosed > 0.9 && around.behind < 0.02 {
-                    let score = around.openness * if y == 0.5 { 1.05 } else { 1.0 };
+                    let score = around.openness * around.clearance.sqrt() * if y == 0.5 { 1.05 } else { 1.0 };
                     if best.as_ref().is_none_or(|b| score > b.0) {
                         best = Some((score, p, around.view));
                     }

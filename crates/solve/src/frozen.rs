@@ -49,6 +49,8 @@ pub struct Frozen {
     /// gather_share / (π A_total).
     gather_density: f64,
     environment_share: f64,
+    /// False in the later steps of the warm start, whose light is reflected only.
+    emits: bool,
 }
 
 /// Bytes of a frozen glossy patch.
@@ -73,10 +75,12 @@ impl Frozen {
     ) {
         self.constant.clear();
         self.directional.clear();
+        self.emits = false;
         // First pass: radiance and the stand-in's power of every patch; glossy ones keep (cosine, lobe) for now.
         let mut power = 0.0;
         for patch in scene.patches() {
             let l = light(patch);
+            self.emits |= !l.emitted.is_black();
             // Stored in single precision: the stored value is the state, so nothing is inconsistent.
             let constant = (l.emitted + l.main_part).to_f32();
             self.constant.push(constant);
@@ -160,6 +164,17 @@ impl Frozen {
                 }
             }
         }
+    }
+
+    /// The share of a patch's radiance that is its own emission, per channel, while it shines in this state.
+    #[inline]
+    pub fn emitted_share(&self, scene: &PatchScene, patch: PatchId, radiance: Rgb) -> Rgb {
+        if !self.emits {
+            return Rgb::BLACK;
+        }
+        let emitted = scene.emission(patch);
+        let share = |e: f64, l: f64| if e > 0.0 && l > 0.0 { e / l } else { 0.0 };
+        Rgb::new(share(emitted.r, radiance.r), share(emitted.g, radiance.g), share(emitted.b, radiance.b))
     }
 
     /// What the environment brings to a ray that leaves the scene in `towards`; black if it does not shine now.

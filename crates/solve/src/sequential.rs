@@ -293,7 +293,7 @@ impl Sequential {
                 });
                 let base = base_radiance(scene, patch, Rgb::from_f32(irradiance[patch.index()]), eye);
                 let constant = if params.representation == Representation::Sample { Rgb::BLACK } else { main_part };
-                constant + (state.observed_n + rest) / n - base
+                [Rgb::BLACK, constant + (state.observed_n + rest) / n - base]
             });
             GlossySolution { main_part, directional, observed_lobe }
         });
@@ -306,6 +306,7 @@ impl Sequential {
             balance: balance(&self.tally, self.emitted, n),
             relative_error: self.relative_error(scene),
             tally: self.tally,
+            splits_direct_light: false,
         }
     }
 }

@@ -48,6 +48,7 @@ pub struct Solution {
     pub(crate) balance: PowerBalance,
     pub(crate) relative_error: f64,
     pub(crate) tally: Tally,
+    pub(crate) splits_direct_light: bool,
 }
 
 /// What a glossy patch knows beside its irradiance.
@@ -57,8 +58,8 @@ pub(crate) struct GlossySolution {
     pub main_part: Rgb,
     /// The representative, scaled.
     pub directional: Option<Directional>,
-    /// The lobe's radiance towards the observer, averaged.
-    pub observed_lobe: Option<Rgb>,
+    /// The lobe's radiance towards the observer, averaged: of light straight from emitting patches, and of all other.
+    pub observed_lobe: Option<[Rgb; 2]>,
 }
 
 impl Solution {
@@ -91,9 +92,16 @@ impl Solution {
     }
 
     /// Radiance that the lobe of a glossy patch sends to the observer given to the solver, averaged over all
-    /// iterations; `None` for diffuse patches, without an observer, or if the eye is behind the patch.
-    pub fn observed_lobe(&self, patch: PatchId) -> Option<Rgb> {
+    /// iterations: of light that comes straight from emitting patches, and of all other light (the paper's schedule
+    /// cannot tell them apart and calls all of it other). `None` for diffuse patches, without an observer, or if the
+    /// eye is behind the patch.
+    pub fn observed_lobe(&self, patch: PatchId) -> Option<[Rgb; 2]> {
         self.glossy.number_of(patch).and_then(|k| self.glossy_light[k].observed_lobe)
+    }
+
+    /// True if [`Solution::observed_lobe`] keeps direct light apart.
+    pub fn splits_direct_light(&self) -> bool {
+        self.splits_direct_light
     }
 
     /// Where the light went.

@@ -31,8 +31,8 @@ pub struct WaveSums {
     pub arrived: FixedSums,
     /// Per glossy patch: Σ deposit · albedo(ω_in).
     pub reflected: FixedSums,
-    /// Per glossy patch: Σ deposit · lobe(ω_in, ω_eye).
-    pub observed: FixedSums,
+    /// Per glossy patch: Σ deposit · lobe(ω_in, ω_eye), of light straight from emitting patches and of all other.
+    pub observed: [FixedSums; 2],
     /// Per glossy patch, first channel: Σ 𝓛(deposit · Δa).
     pub importance: FixedSums,
 }
@@ -41,7 +41,12 @@ impl WaveSums {
     /// Empty sums.
     pub fn new(patches: usize, glossy: usize) -> Self {
         let sums = FixedSums::new;
-        Self { arrived: sums(patches), reflected: sums(glossy), observed: sums(glossy), importance: sums(glossy) }
+        Self {
+            arrived: sums(patches),
+            reflected: sums(glossy),
+            observed: [sums(glossy), sums(glossy)],
+            importance: sums(glossy),
+        }
     }
 }
 
@@ -140,8 +145,11 @@ impl WaveContext<'_> {
             Far::Patch(hit) => {
                 let there = frozen.outgoing(self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
                 let deposits = transfer(self.estimator, &here, &there);
-                self.deposit(hit, deposits.on_hit, -direction, 2 * index, sums, unit, result);
-                self.deposit(shooter, deposits.on_shooter, direction, 2 * index + 1, sums, unit, result);
+                let direct = frozen.emitted_share(self.scene, shooter, here.radiance);
+                self.deposit(hit, deposits.on_hit, deposits.on_hit * direct, -direction, 2 * index, sums, unit, result);
+                let direct = frozen.emitted_share(self.scene, hit, there.radiance);
+                let d = deposits.on_shooter;
+                self.deposit(shooter, d, d * direct, direction, 2 * index + 1, sums, unit, result);
             }
             Far::Back => result.tally.lost += here.radiance / here.density,
             Far::Sky => {
@@ -149,7 +157,8 @@ impl WaveContext<'_> {
                 let deposits = transfer(self.estimator, &here, &sky);
                 result.tally.escaped += deposits.on_hit;
                 result.tally.sky += deposits.on_shooter;
-                self.deposit(shooter, deposits.on_shooter, direction, 2 * index + 1, sums, unit, result);
+                let d = deposits.on_shooter;
+                self.deposit(shooter, d, Rgb::BLACK, direction, 2 * index + 1, sums, unit, result);
             }
         }
     }
@@ -164,13 +173,15 @@ impl WaveContext<'_> {
         let deposits = transfer(self.estimator, &sky, &there);
         result.tally.sky += deposits.on_hit;
         result.tally.escaped += deposits.on_shooter;
-        self.deposit(hit, deposits.on_hit, -direction, 2 * index, sums, unit, result);
+        self.deposit(hit, deposits.on_hit, Rgb::BLACK, -direction, 2 * index, sums, unit, result);
     }
 
+    /// Adds a deposit to all sums of a patch; `direct` is the part of it that comes straight from emission.
     fn deposit(
         &self,
         patch: PatchId,
         deposit: Rgb,
+        direct: Rgb,
         wi: DVec3,
         end: u64,
         sums: &WaveSums,
@@ -200,7 +211,9 @@ impl WaveContext<'_> {
             return;
         }
         if let Some(eye) = self.glossy.to_eye(k) {
-            sums.observed.add(k, deposit * brdf.lobe_eval(n, wi, eye), unit);
+            let lobe = brdf.lobe_eval(n, wi, eye);
+            sums.observed[0].add(k, direct * lobe, unit);
+            sums.observed[1].add(k, (deposit - direct) * lobe, unit);
         }
         let weight = if self.representation == Representation::Sample { albedo } else { brdf.lobe_albedo(n.dot(wi)) };
         let importance = (deposit * weight).luminance();

@@ -37,7 +37,7 @@ const SMALLEST_WARM_START: u64 = 1 << 16;
 pub(crate) const BYTES_PER_PATCH: usize = 24 + 24 + 24 + 12 + 8 + 4;
 /// Beside that: the numbering (over all patches, counted here), sums, state and frozen light of glossy patches.
 pub(crate) const BYTES_PER_GLOSSY_PATCH: usize =
-    4 + 4 + 24 + 3 * 24 + size_of::<GlossyState>() + crate::frozen::BYTES_PER_GLOSSY_PATCH;
+    4 + 4 + 24 + 4 * 24 + size_of::<GlossyState>() + crate::frozen::BYTES_PER_GLOSSY_PATCH;
 
 /// State of the default schedule.
 #[derive(Debug)]
@@ -67,8 +67,8 @@ pub(crate) struct Waves {
 struct GlossyState {
     /// Σ deposit · albedo, equal weights.
     reflected: Rgb,
-    /// Σ deposit · lobe towards the eye, equal weights.
-    observed: Rgb,
+    /// Σ deposit · lobe towards the eye, equal weights: direct light, other light.
+    observed: [Rgb; 2],
     /// Σ v·𝓛(deposit · Δa).
     importance: f64,
     representative: Representative,
@@ -150,7 +150,9 @@ impl Waves {
         );
         for (k, state) in self.glossy.iter_mut().enumerate() {
             state.reflected += reflected[k] * share;
-            state.observed += sums.observed.take(k, unit) * share;
+            for (sum, part) in state.observed.iter_mut().zip(&sums.observed) {
+                *sum += part.take(k, unit) * share;
+            }
             state.importance += sums.importance.take(k, unit).r * weight;
         }
     }
@@ -223,7 +225,7 @@ impl Waves {
         scale(&mut self.output, n0);
         for g in &mut self.glossy {
             g.reflected *= n0;
-            g.observed *= n0;
+            g.observed = g.observed.map(|o| o * n0);
             g.importance *= source;
         }
         let tally = std::mem::take(&mut self.tally);
@@ -347,7 +349,7 @@ impl Waves {
             GlossySolution {
                 main_part: self.glossy[k].reflected * per_area / PI,
                 directional: self.directional(scene, params, p, k),
-                observed_lobe: observed.map(|_| self.glossy[k].observed * per_area),
+                observed_lobe: observed.map(|_| self.glossy[k].observed.map(|o| o * per_area)),
             }
         });
         let glossy_light = glossy_light.collect();
@@ -359,6 +361,7 @@ impl Waves {
             balance: balance(&self.tally, self.emitted, w),
             relative_error: self.relative_error(scene),
             tally: self.tally,
+            splits_direct_light: params.representation != Representation::Main,
         }
     }
 }

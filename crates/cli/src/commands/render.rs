@@ -6,11 +6,11 @@ use std::time::Instant;
 use anyhow::{anyhow, bail};
 use serde_json::json;
 use twinray::format;
-use twinray::render::{self, Exposure, Picture, PictureOptions, ToneCurve};
+use twinray::render::{self, Exposure, Lobes, Picture, PictureOptions, ToneCurve};
 use twinray::scene::Camera;
 use twinray::solve::{Estimator, Observer, Params, Representation, Schedule, Solver};
 
-use crate::args::{EstimatorArg, ExposureArg, Preset, RenderArgs, RepresentationArg, SolveArgs, ToneArg};
+use crate::args::{EstimatorArg, ExposureArg, LobesArg, Preset, RenderArgs, RepresentationArg, SolveArgs, ToneArg};
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
@@ -60,7 +60,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let start = Instant::now();
     let solution = solver.solution();
     let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
-    let options = PictureOptions { width, height, samples: args.samples, flat: args.flat };
+    let lobes = match args.lobes {
+        LobesArg::Traced => Lobes::Traced,
+        LobesArg::Patches => Lobes::Patches,
+    };
+    let options = PictureOptions { width, height, samples: args.samples, flat: args.flat, lobes };
     let picture = render::render(&loaded.patches, &solution, camera, &options);
     let exposure = match args.exposure {
         ExposureArg::Auto => Exposure::Auto,

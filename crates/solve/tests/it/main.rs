@@ -1,0 +1,30 @@
+//! The solver against what is known: analytic scenes, conservation laws, and itself by other means.
+
+mod analytic;
+mod determinism;
+mod estimators;
+mod representation;
+
+use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Rgb, Scene};
+use twinray_solve::{Params, Solution, Solver};
+
+/// A scene cut into about `patches` patches.
+fn cut(scene: &Scene, patches: usize) -> PatchScene {
+    PatchScene::new(scene, PatchOptions { budget: PatchBudget::Count(patches), two_sided: false }).unwrap()
+}
+
+fn solve(scene: &PatchScene, params: Params, rays: u64) -> Solution {
+    let mut solver = Solver::new(scene, params, None).unwrap();
+    solver.run(rays);
+    solver.solution()
+}
+
+/// Area-weighted mean irradiance over the patches that a condition chooses.
+fn mean_irradiance(scene: &PatchScene, solution: &Solution, which: impl Fn(twinray_scene::PatchId) -> bool) -> Rgb {
+    let (mut sum, mut area) = (Rgb::BLACK, 0.0);
+    for p in scene.patches().filter(|&p| which(p)) {
+        sum += solution.irradiance(p) * scene.area(p);
+        area += scene.area(p);
+    }
+    sum / area
+}
