@@ -131,12 +131,12 @@ fn mend_attributes(context: &mut Context<'_>, mesh: &mut Mesh, element: &str) {
 
 /// Counts triangles as they are placed in the world.
 #[derive(Default)]
-pub(crate) struct Placed {
+pub(crate) struct Account {
     triangles: u64,
     instances: u64,
 }
 
-impl Placed {
+impl Account {
     /// Counts one more placed mesh.
     pub(crate) fn add(&mut self, context: &Context<'_>, element: &str, triangles: usize) -> Result<(), FormatError> {
         self.triangles = self.triangles.saturating_add(triangles as u64);

@@ -36,8 +36,13 @@ pub(crate) fn safe_path(reference: &str) -> Result<String, &'static str> {
     if parts.is_empty() { Err("names no file") } else { Ok(parts.join("/")) }
 }
 
-/// `text` with `%20` and the like replaced; sequences that are not two hex digits, or not UTF-8, stay as they are.
+/// `text` with `%20` and the like replaced; left as it is if the result is not UTF-8.
 pub(crate) fn percent_decode(text: &str) -> String {
+    String::from_utf8(percent_bytes(text)).unwrap_or_else(|_| text.to_owned())
+}
+
+/// The bytes that `text` stands for; sequences that are not two hex digits stand for themselves.
+fn percent_bytes(text: &str) -> Vec<u8> {
     let bytes = text.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
     let mut i = 0;
@@ -51,7 +56,7 @@ pub(crate) fn percent_decode(text: &str) -> String {
             i += 1;
         }
     }
-    String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
+    out
 }
 
 /// The payload of a `data:` URI; `None` if `uri` is not one, an error if it cannot be decoded.
@@ -64,7 +69,7 @@ pub(crate) fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
         return Some(Err("a data: URI without a comma".to_owned()));
     };
     if !head.to_ascii_lowercase().ends_with(";base64") {
-        return Some(Ok(percent_decode(payload).into_bytes()));
+        return Some(Ok(percent_bytes(payload)));
     }
     // Exporters disagree on padding; the data are the same with and without.
     let config = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);

@@ -23,7 +23,7 @@ use self::node::Placed;
 use self::primitive::Primitives;
 use crate::context::Context;
 use crate::error::FormatError;
-use crate::geometry::{Placed as Account, clean, mesh_bytes, no_triangles};
+use crate::geometry::{Account, clean, mesh_bytes, no_triangles};
 use crate::warning::name_list;
 
 pub use self::write::write_glb;
@@ -169,15 +169,16 @@ impl Content<'_, '_> {
 fn check_version(context: &Context<'_>, root: &Element<'_>) -> Result<(), FormatError> {
     let asset = root.require("asset", "an object with the glTF version")?;
     let version = asset.require("version", "\"2.0\"")?;
-    let major = |text: &str| text.split('.').next().and_then(|m| m.parse::<u32>().ok());
-    let newest = asset.text("minVersion")?.or(asset.text("version")?);
-    match asset.text("version")?.and_then(major) {
-        None => Err(version.invalid("\"2.0\"")),
-        Some(2) if newest.is_none_or(|v| v == "2.0" || asset.get("minVersion").is_none()) => Ok(()),
-        Some(_) => {
-            let what = format!("glTF version {}", newest.unwrap_or_default());
+    let text = asset.text("version")?.unwrap_or_default();
+    let minimum = asset.text("minVersion")?;
+    match text.split('.').next().map(str::parse::<u32>) {
+        // Minor versions only add; who cannot do without an addition says so in `minVersion`.
+        Some(Ok(2)) if minimum.is_none_or(|m| m == "2.0") => Ok(()),
+        Some(Ok(_)) => {
+            let what = format!("glTF version {}", minimum.unwrap_or(text));
             Err(FormatError::unsupported(context.file, "asset.version", what, "Export the scene as glTF 2.0"))
         }
+        _ => Err(version.invalid("\"2.0\"")),
     }
 }
 

@@ -45,24 +45,26 @@ pub(super) struct Builder<'d> {
 
 impl Builder<'_> {
     /// The mesh of `group`, without its material; `None` if it has no triangles.
-    pub(super) fn build(&mut self, context: &mut Context<'_>, group: &Group) -> Result<Option<Mesh>, FormatError> {
+    pub(super) fn build(&mut self, context: &mut Context<'_>, group: Group) -> Result<Option<Mesh>, FormatError> {
         let element = format!("object \"{}\"", group.name);
-        let triangles = group.corners.len() - 2 * group.ends.len();
+        let triangles = group.corners.len() - 2 * group.sizes.len();
         self.triangles += triangles as u64;
         check_triangles(context, &element, self.triangles)?;
-        // Triangles of corners, the keys of cleaning, and the table that welds vertices.
-        let scratch = triangles as u64 * 16 + group.corners.len() as u64 * 20;
-        context.charge(scratch + mesh_bytes(0, triangles, false, false), &element)?;
+        context.charge(mesh_bytes(0, triangles, false, false), &element)?;
 
         let mut mesh = Mesh { name: group.name.clone(), ..Mesh::default() };
         let mut vertices = Vertices::default();
         let has = |kind: usize| group.corners.iter().filter(|c| c[kind] != NONE).count();
         let (textured, smooth) = (has(1) > 0, has(2) == group.corners.len());
-        let mut start = 0;
+        mesh.triangles.reserve_exact(triangles);
+        let mut rest = group.corners.as_slice();
         let mut points = Vec::new();
-        for &end in &group.ends {
-            let corners = &group.corners[start..end];
-            start = end;
+        for &size in &group.sizes {
+            let (corners, others) = rest.split_at(size as usize);
+            rest = others;
+            vertices.pay(context, corners.len(), &element)?;
+            let working = self.triangulator.bytes(corners.len());
+            context.charge(working, &element)?;
             points.clear();
             points.extend(corners.iter().map(|c| self.point(c[0])));
             let (document, triangles) = (self.document, &mut mesh.triangles);
@@ -81,8 +83,12 @@ impl Builder<'_> {
                 triangles.push(triangle);
             });
             self.flipped += flipped;
+            context.budget.release(working);
         }
-        let corners = vertices.corners;
+        context.budget.release(vertices.paid * VERTEX_BYTES + group.bytes());
+        drop(group);
+        let corners = std::mem::take(&mut vertices.corners);
+        drop(vertices);
         context.charge(mesh_bytes(corners.len(), 0, smooth, textured), &element)?;
         mesh.positions = corners.iter().map(|c| self.point(c[0]).as_vec3().to_array()).collect();
         if textured {
@@ -93,8 +99,11 @@ impl Builder<'_> {
             mesh.normals = corners.iter().map(normal).collect();
             self.dangling += usize::from(mesh.normals.is_none());
         }
+        drop(corners);
+        // Cleaning sorts keys of 16 bytes.
+        context.charge(triangles as u64 * 16, &element)?;
         clean(context, &mut mesh);
-        context.budget.release(scratch);
+        context.budget.release(triangles as u64 * 16);
         Ok(Some(mesh).filter(|m| !m.triangles.is_empty()))
     }
 
@@ -124,9 +133,27 @@ fn author_normal(document: &Document, index: u32) -> Option<DVec3> {
 struct Vertices {
     corners: Vec<[u32; 3]>,
     numbers: HashMap<[u32; 3], u32>,
+    /// Vertices whose memory was asked for.
+    paid: u64,
 }
 
+/// Memory of one vertex while corners are welded: the corner, and its place in a hash table half full.
+const VERTEX_BYTES: u64 = 44;
+
 impl Vertices {
+    /// Asks for the memory of `more` vertices.
+    fn pay(&mut self, context: &mut Context<'_>, more: usize, element: &str) -> Result<(), FormatError> {
+        // In steps: asking costs more than welding.
+        const STEP: u64 = 4096;
+        let needed = (self.corners.len() + more) as u64;
+        if needed > self.paid {
+            let step = (needed - self.paid).next_multiple_of(STEP);
+            context.charge(step * VERTEX_BYTES, element)?;
+            self.paid += step;
+        }
+        Ok(())
+    }
+
     fn number(&mut self, corner: [u32; 3]) -> u32 {
         let next = self.corners.len() as u32;
         let number = *self.numbers.entry(corner).or_insert(next);

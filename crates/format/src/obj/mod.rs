@@ -26,7 +26,9 @@ pub use self::write::{ObjFiles, write_obj};
 
 /// Reads an `.obj` file.
 pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, FormatError> {
-    let document = parse::parse(context, bytes)?;
+    let mut document = parse::parse(context, bytes)?;
+    // Taken out, so that the faces of each group can go once it is a mesh.
+    let groups = std::mem::take(&mut document.groups);
     let mut materials = Materials::new(read_libraries(context, &document.libraries)?);
     let centre = mesh::centre(&document, context.limits.max_coordinate);
     let mut builder = Builder {
@@ -38,11 +40,12 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
         triangles: 0,
     };
     let mut scene = Scene::default();
-    for group in &document.groups {
+    for group in groups {
+        let material = group.material.clone();
         let Some(mesh) = builder.build(context, group)? else { continue };
-        let material = materials.of(context, group.material.as_deref());
+        let material = materials.of(context, material.as_deref());
         let instance = Instance {
-            name: group.name.clone(),
+            name: mesh.name.clone(),
             mesh: scene.meshes.len(),
             transform: DAffine3::from_translation(centre),
         };

@@ -92,11 +92,12 @@ fn colour(line: &Line<'_>) -> Result<Option<Rgb>, String> {
 /// `map_Kd -clamp on -o 0 0 0 wood floor.png`: options first, then a name that may contain spaces.
 fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<Map, String> {
     let (mut rest, mut clamp) = (line.rest, false);
-    while let Some(option) = rest.strip_prefix('-').and_then(|r| r.split_ascii_whitespace().next()) {
-        rest = rest[1 + option.len()..].trim_start();
+    while let Some(options) = rest.strip_prefix('-') {
+        let (option, others) = first_word(options);
+        rest = others;
         let mut word = || {
-            let word = rest.split_ascii_whitespace().next().unwrap_or_default();
-            rest = rest[word.len()..].trim_start();
+            let (word, others) = first_word(rest);
+            rest = others;
             word
         };
         match option {
@@ -111,11 +112,11 @@ fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<M
             "o" | "s" | "t" => {
                 // One to three numbers.
                 for _ in 0..3 {
-                    let next = rest.split_ascii_whitespace().next().unwrap_or_default();
+                    let (next, others) = first_word(rest);
                     if next.parse::<f64>().is_err() {
                         break;
                     }
-                    rest = rest[next.len()..].trim_start();
+                    rest = others;
                 }
                 let place = format!("line {}", line.number);
                 context.warnings.push(file, place, format!("option -{option} of {} is ignored", line.keyword));
@@ -127,4 +128,9 @@ fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<M
         return Err("found no file name".to_owned());
     }
     Ok(Map { file: rest.to_owned(), clamp })
+}
+
+/// The text before the first white space and that after it; the former is empty if `text` begins with some.
+fn first_word(text: &str) -> (&str, &str) {
+    text.split_once(char::is_whitespace).map_or((text, ""), |(word, rest)| (word, rest.trim_start()))
 }

@@ -31,8 +31,19 @@ pub(super) struct Group {
     pub(super) material: Option<String>,
     /// Position, texture coordinate and normal of each corner, from 0; `NONE` where absent.
     pub(super) corners: Vec<[u32; 3]>,
-    /// Where each polygon ends in `corners`.
-    pub(super) ends: Vec<usize>,
+    /// Number of corners of each polygon.
+    pub(super) sizes: Vec<u32>,
+}
+
+/// Memory of one corner and of one polygon in a `Group`, its arrays three quarters full.
+const CORNER_BYTES: u64 = 16;
+const POLYGON_BYTES: u64 = 6;
+
+impl Group {
+    /// Memory of the faces, as charged while reading.
+    pub(super) fn bytes(&self) -> u64 {
+        self.corners.len() as u64 * CORNER_BYTES + self.sizes.len() as u64 * POLYGON_BYTES
+    }
 }
 
 /// What the lines so far have set.
@@ -55,6 +66,7 @@ struct State {
 pub(super) fn parse(context: &mut Context<'_>, bytes: &[u8]) -> Result<Document, FormatError> {
     let mut state = State::default();
     let text = super::text(context.file, bytes, "an OBJ file")?;
+    state.reserve(context, &text)?;
     for line in super::lines(&text) {
         state.line(context, &line)?;
     }
@@ -78,16 +90,34 @@ pub(super) fn parse(context: &mut Context<'_>, bytes: &[u8]) -> Result<Document,
 }
 
 impl State {
+    /// Counts vertices first: growing the arrays step by step would take twice their memory.
+    fn reserve(&mut self, context: &mut Context<'_>, text: &str) -> Result<(), FormatError> {
+        let (mut positions, mut texcoords, mut normals) = (0, 0, 0);
+        for line in super::lines(text) {
+            match line.keyword {
+                "v" => positions += 1,
+                "vt" => texcoords += 1,
+                "vn" => normals += 1,
+                _ => {}
+            }
+        }
+        context.charge(positions * 24, "vertices")?;
+        context.charge(texcoords * 8, "texture coordinates")?;
+        context.charge(normals * 12, "normals")?;
+        self.document.positions.reserve_exact(positions as usize);
+        self.document.texcoords.reserve_exact(texcoords as usize);
+        self.document.normals.reserve_exact(normals as usize);
+        Ok(())
+    }
+
     fn line(&mut self, context: &mut Context<'_>, line: &Line<'_>) -> Result<(), FormatError> {
         match line.keyword {
             "v" => {
-                context.charge(36, "vertices")?;
                 let position = line.numbers(context.file)?;
                 self.colours |= line.rest.split_ascii_whitespace().take_while(|w| !w.starts_with('#')).count() >= 6;
                 self.document.positions.push(position);
             }
             "vt" => {
-                context.charge(12, "texture coordinates")?;
                 // One number is allowed: a texture of one dimension.
                 let words = line.rest.split_ascii_whitespace().count();
                 let [u, v] =
@@ -96,7 +126,6 @@ impl State {
                 self.document.texcoords.push([u as f32, (1.0 - v) as f32]);
             }
             "vn" => {
-                context.charge(18, "normals")?;
                 self.document.normals.push(line.numbers(context.file)?.map(|c: f64| c as f32));
             }
             "f" | "fo" => self.face(context, line)?,
@@ -151,6 +180,7 @@ impl State {
             if corner[0] as usize >= counts[0] && self.ahead.is_none_or(|(index, _)| corner[0] > index) {
                 self.ahead = Some((corner[0], line.number));
             }
+            context.charge(CORNER_BYTES, "faces")?;
             corners.push(corner);
         }
         let count = corners.len() - start;
@@ -159,9 +189,8 @@ impl State {
             self.small_faces += 1;
             return Ok(());
         }
-        let end = corners.len();
-        self.document.groups[group].ends.push(end);
-        context.charge(count as u64 * 16 + 12, "faces")
+        self.document.groups[group].sizes.push(count as u32);
+        context.charge(POLYGON_BYTES, "faces")
     }
 
     /// The group of the current names, made when the first face needs it.
@@ -174,7 +203,7 @@ impl State {
             None => {
                 context.charge(1024 + 4 * (key.0.len() as u64), "groups")?;
                 let name = if key.0.is_empty() { "object".to_owned() } else { key.0.clone() };
-                groups.push(Group { name, material: key.1.clone(), corners: Vec::new(), ends: Vec::new() });
+                groups.push(Group { name, material: key.1.clone(), corners: Vec::new(), sizes: Vec::new() });
                 self.by_name.insert(key, groups.len() - 1);
                 groups.len() - 1
             }

@@ -21,6 +21,11 @@ impl Default for Triangulator {
 }
 
 impl Triangulator {
+    /// Memory that a polygon takes while it is split: its points, flat points, the corners left, the triangles.
+    pub(super) fn bytes(&self, corners: usize) -> u64 {
+        corners as u64 * 72
+    }
+
     /// Calls `emit` with the corners of each triangle of the polygon `points`, `points.len() − 2` times, in the
     /// polygon's orientation.
     pub(super) fn split(&mut self, points: &[DVec3], mut emit: impl FnMut([usize; 3])) {

@@ -89,7 +89,7 @@ fn textures_come_from_files_data_uris_and_views() {
     // The same bytes as plain text: percent-encoded.
     let encoded: String = picture.iter().map(|b| format!("%{b:02x}")).collect();
     sources.push(json!({ "uri": format!("data:image/png,{encoded}") }));
-    for source in sources.drain(..2) {
+    for source in sources {
         doc.json["images"] = json!([source]);
         let reading = read_with("test.glb", &doc.glb(), &[("my picture.png", &picture)]).unwrap();
         assert_eq!(reading.scene.images[0].rgba, [10, 20, 30, 255], "{source}");
@@ -114,11 +114,7 @@ fn textures_that_cannot_be_had_leave_the_factor() {
         doc.json["images"] = images;
         doc.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 0 });
         let reading = doc.read().unwrap();
-        if element == "baseColorTexture" {
-            assert_warns(&reading, &["textures[0].source", "number of images"].as_slice()[1..]);
-        } else {
-            assert_warns(&reading, &["test.glb", element, message]);
-        }
+        assert_warns(&reading, &["test.glb", element, message]);
         let texel = colour(&reading.scene.materials[0].surface);
         assert_eq!((texel.factor, &texel.texture), (Rgb::grey(0.5), &None));
     }

@@ -1,6 +1,7 @@
 //! Any bytes: random changes of good files never panic and never take long.
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use twinray_format::write_glb;
 
 use crate::support::{Doc, png, read, read_with};
@@ -22,17 +23,47 @@ const OBJ: &str = "mtllib a.mtl\no box\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5\nvt
     usemtl a\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng more\nusemtl b\nf -4 -3 -2\nl 1 2\ns off\n";
 const MTL: &str = "newmtl a\nKd 0.5 0.5 0.5\nKs 0.5 0.5 0.5\nNs 10\nmap_Kd -o 1 1 t.png\nnewmtl b\nKe 1 1 1\nd 0.5\n";
 
+/// What random bytes rarely hit upon.
+const WORDS: [&str; 24] = [
+    "-1",
+    "0",
+    "1.0",
+    "4294967295",
+    "4294967296",
+    "18446744073709551615",
+    "-9223372036854775808",
+    "1e999",
+    "nan",
+    "inf",
+    "1e-320",
+    "null",
+    "[]",
+    "{}",
+    "\"\"",
+    "[0]",
+    "\\\n",
+    "\n",
+    " ",
+    "/",
+    "-",
+    "- ",
+    "\u{e4}\u{2003}",
+    "\"sparse\":{\"count\":1},",
+];
+
 fn changed(mut bytes: Vec<u8>, changes: &[(u32, u8, u8)]) -> Vec<u8> {
     for &(place, kind, value) in changes {
         if bytes.is_empty() {
             break;
         }
         let at = place as usize % bytes.len();
-        match kind % 4 {
+        match kind % 6 {
             0 => bytes[at] = value,
             1 => bytes[at] ^= 1 << (value % 8),
             2 => bytes.insert(at, value),
-            _ => drop(bytes.remove(at)),
+            3 => drop(bytes.remove(at)),
+            4 => drop(bytes.splice(at..at, WORDS[value as usize % WORDS.len()].bytes())),
+            _ => drop(bytes.splice(at..(at + 1).min(bytes.len()), WORDS[value as usize % WORDS.len()].bytes())),
         }
     }
     bytes
@@ -41,6 +72,9 @@ fn changed(mut bytes: Vec<u8>, changes: &[(u32, u8, u8)]) -> Vec<u8> {
 fn changes() -> impl Strategy<Value = Vec<(u32, u8, u8)>> {
     prop::collection::vec((any::<u32>(), any::<u8>(), any::<u8>()), 1..8)
 }
+
+/// Some seconds. `map_Kd - a` once panicked, and took about ten thousand cases to appear.
+const CASES: u32 = 20_000;
 
 /// Whatever could be read can be written again.
 fn use_it(result: Result<twinray_format::Reading, twinray_format::FormatError>) {
@@ -55,7 +89,7 @@ fn use_it(result: Result<twinray_format::Reading, twinray_format::FormatError>) 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: CASES, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
     fn glb_files(changes in changes()) {

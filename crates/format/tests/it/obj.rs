@@ -131,10 +131,11 @@ fn missing_files_leave_grey() {
     assert_warns(&reading, &["grey", "\"stone\""]);
     assert_eq!(colour(&reading.scene.materials[0].surface).factor, Rgb::grey(0.5));
     // Broken lines of an MTL file are named, and the rest counts.
-    let files: [(&str, &[u8]); 1] = [("a.mtl", b"newmtl stone\nKd 0.1\nKs 1 2\nNs many\nmap_Kd\nKe 1 1 1\n")];
+    let mtl = b"newmtl stone\nKd 0.1\nKs 1 2\nNs many\nmap_Kd\nmap_Kd - a\nmap_Kd -bm\nKe 1 1 1\n";
+    let files: [(&str, &[u8]); 1] = [("a.mtl", mtl)];
     let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl stone\nf 1 2 3\n");
     let reading = read_with("a.obj", obj.as_bytes(), &files).unwrap();
-    for line in ["a.mtl: line 3", "a.mtl: line 4", "a.mtl: line 5"] {
+    for line in ["a.mtl: line 3", "a.mtl: line 4", "a.mtl: line 5", "a.mtl: line 6", "a.mtl: line 7"] {
         assert_warns(&reading, &[line]);
     }
     assert_eq!(colour(&reading.scene.materials[0].surface).factor, Rgb::grey(0.1));
