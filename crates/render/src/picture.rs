@@ -63,6 +63,8 @@ pub struct Picture {
     pub empty: f64,
 }
 
+/// A ray into a lobe counts for at most so many times the lobe's mean as the patches know it.
+const FIREFLY: f64 = 6.0;
 /// One-sided backs that a camera ray passes at most.
 const MOST_BACKS: u32 = 16;
 
@@ -176,7 +178,12 @@ impl View<'_> {
         let cosine = scene.normal(patch).dot(-direction).max(0.0);
         let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
         let lobe = match self.traced && brdf.is_glossy() {
-            true => smooth.lobe[0] + self.lobe_ray(&hit, patch, &brdf, -direction, u),
+            true => {
+                // What the patches remember bounds a single ray: a rare bright hit would be a white dot.
+                let limit = FIREFLY * smooth.lobe[1].luminance().max(0.0);
+                let traced = self.lobe_ray(&hit, patch, &brdf, -direction, u);
+                smooth.lobe[0] + traced * (limit / traced.luminance().max(1e-300)).min(1.0)
+            }
             false => smooth.lobe[0] + smooth.lobe[1],
         };
         // The lobe of a single patch may be negative in the paper's representation; a picture never is.

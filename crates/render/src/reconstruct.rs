@@ -30,15 +30,25 @@ const COVER_TESTS: u32 = 24;
 const LEAST_SHARE: f64 = 0.2;
 
 /// What the display needs to know of a cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Cell {
-    /// A free point of the cell: its centre, unless something stands on that.
-    origin: DVec3,
     normal: DVec3,
-    /// Share of the cell that its origin can see: the rest gets no light and would show as a dark rim.
-    share: f64,
     radius: f64,
+    /// The free parts of the cell: one, unless something stands on it; none if all is covered.
+    parts: Vec<Part>,
 }
+
+/// A part of a cell whose points see each other. A cell that passes under a wall has one on either side, and light
+/// must not pass from the one to the other.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    origin: DVec3,
+    /// Its share of the cell: the covered rest gets no light, and would show as a dark rim.
+    share: f64,
+}
+
+/// A part of another cell.
+type Neighbour = (PatchId, u8);
 
 /// Reconstructed light at a point.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +57,15 @@ pub struct Smooth {
     pub irradiance: Rgb,
     /// Radiance of the lobe towards the observer: of direct light, and of all other light.
     pub lobe: [Rgb; 2],
+}
+
+/// How far a cell's light reaches.
+#[derive(Clone, Copy)]
+enum Kernel {
+    /// Each cell's own radius.
+    Cells,
+    /// A common radius.
+    Wide(f64),
 }
 
 /// Reconstruction over all cells of a scene.
@@ -58,7 +77,8 @@ pub struct Reconstruction<'a> {
     typical_size: f64,
     grid: Grid,
     cells: Vec<OnceLock<Cell>>,
-    neighbours: Vec<OnceLock<Box<[PatchId]>>>,
+    /// Per cell and part.
+    neighbours: Vec<OnceLock<Vec<Box<[Neighbour]>>>>,
 }
 
 impl<'a> Reconstruction<'a> {
@@ -82,39 +102,58 @@ impl<'a> Reconstruction<'a> {
     pub fn smooth(&self, patch: PatchId, hit: &SurfaceHit) -> Smooth {
         let x = self.scene.point_of(hit.triangle, hit.u, hit.v);
         let n = self.scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+        let parts = &self.cell(patch).parts;
+        let part = match parts.len() {
+            0 => None,
+            1 => Some(0),
+            _ => parts.iter().position(|p| self.sees(x, n, patch, p.origin)),
+        };
+        let near = part.and_then(|part| self.mean(patch, x, n, &self.neighbours(patch)[part], Kernel::Cells));
+        // A sliver that its own cell does not know: ask the nearest cells that the point itself can see.
+        near.or_else(|| {
+            let reach = 3.0 * self.cell(patch).radius;
+            let mut list = self.visible_from(x, n, self.same_surface(patch, reach), None);
+            list.truncate(8);
+            self.mean(patch, x, n, &list, Kernel::Wide(reach))
+        })
+        .unwrap_or_else(|| self.flat(patch))
+    }
+
+    /// Weighted mean over neighbours; `None` if none has a weight.
+    fn mean(&self, patch: PatchId, x: DVec3, n: DVec3, neighbours: &[Neighbour], kernel: Kernel) -> Option<Smooth> {
         let glossy = self.scene.is_glossy(patch);
         let material = self.scene.material(patch) as *const _;
         let mut sum = Smooth { irradiance: Rgb::BLACK, lobe: [Rgb::BLACK; 2] };
         let (mut total, mut lobe_total) = (0.0, 0.0);
-        for &other in self.neighbours(patch) {
+        for &(other, part) in neighbours {
             let cell = self.cell(other);
-            let offset = cell.origin - x;
+            let Part { origin, share } = cell.parts[usize::from(part)];
+            let radius = if let Kernel::Wide(reach) = kernel { reach } else { cell.radius };
+            let offset = origin - x;
             let distance_squared = offset.length_squared();
-            let kernel = 1.0 - distance_squared / (cell.radius * cell.radius);
-            if kernel <= 0.0 {
+            let closeness = 1.0 - distance_squared / (radius * radius);
+            if closeness <= 0.0 {
                 continue;
             }
             let rise = offset.dot(cell.normal).abs().max(offset.dot(n).abs()) / distance_squared.sqrt().max(1e-12);
             let plane = fade(SAME_PLANE - rise, 0.15);
             let turn = fade(n.dot(cell.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
             // A cell that is half covered says less, and says it with the error of its share.
-            let trust = self.scene.area(other) * cell.share * cell.share * cell.share;
-            let weight = kernel * kernel * plane * turn * trust;
-            sum.irradiance += self.solution.irradiance(other) * (weight / cell.share);
+            let trust = self.scene.area(other) * share * share * share;
+            let weight = closeness * closeness * plane * turn * trust;
+            sum.irradiance += self.solution.irradiance(other) * (weight / share);
             total += weight;
             if glossy
                 && let Some(lobe) = self.solution.observed_lobe(other)
                 && std::ptr::eq(self.scene.material(other), material)
             {
-                sum.lobe[0] += lobe[0] * (weight / cell.share);
-                sum.lobe[1] += lobe[1] * (weight / cell.share);
+                sum.lobe[0] += lobe[0] * (weight / share);
+                sum.lobe[1] += lobe[1] * (weight / share);
                 lobe_total += weight;
             }
         }
-        let own = self.flat(patch);
-        let irradiance = if total > 0.0 { sum.irradiance / total } else { own.irradiance };
-        let lobe = if lobe_total > 0.0 { sum.lobe.map(|l| l / lobe_total) } else { own.lobe };
-        Smooth { irradiance, lobe }
+        let lobe = if lobe_total > 0.0 { sum.lobe.map(|l| l / lobe_total) } else { self.flat(patch).lobe };
+        (total > 0.0).then(|| Smooth { irradiance: sum.irradiance / total, lobe })
     }
 
     /// Light of the patch itself.
@@ -125,18 +164,32 @@ impl<'a> Reconstruction<'a> {
         }
     }
 
-    fn neighbours(&self, patch: PatchId) -> &[PatchId] {
+    /// Neighbours of each part of a cell.
+    fn neighbours(&self, patch: PatchId) -> &[Box<[Neighbour]>] {
         self.neighbours[patch.index()].get_or_init(|| {
             let here = self.cell(patch);
             let reach = here.radius + 1.2 * self.typical_size.max(self.scene.area(patch).sqrt());
             let mut near = self.same_surface(patch, reach);
             near.truncate(MOST_NEIGHBOURS);
-            near.retain(|&other| {
-                self.cell(other).share >= LEAST_SHARE
-                    && (other == patch || self.sees(here.origin, here.normal, other, self.cell(other).origin))
-            });
-            near.into_boxed_slice()
+            let of = |(k, part): (usize, &Part)| {
+                self.visible_from(part.origin, here.normal, near.clone(), Some((patch, k as u8))).into_boxed_slice()
+            };
+            here.parts.iter().enumerate().map(of).collect()
         })
+    }
+
+    /// The first part of each cell that a point sees, cells of which too little is free left out. `own` is the part
+    /// that the point belongs to.
+    fn visible_from(&self, x: DVec3, n: DVec3, cells: Vec<PatchId>, own: Option<Neighbour>) -> Vec<Neighbour> {
+        let visible = |other: PatchId| {
+            let parts = &self.cell(other).parts;
+            let part = match own {
+                Some((patch, part)) if patch == other => Some(usize::from(part)),
+                _ => parts.iter().position(|p| p.share >= LEAST_SHARE && self.sees(x, n, other, p.origin)),
+            };
+            part.filter(|&k| parts[k].share >= LEAST_SHARE).map(|k| (other, k as u8))
+        };
+        cells.into_iter().filter_map(visible).collect()
     }
 
     /// Cells within `reach` whose normals and places fit the surface of `patch`, nearest first.
@@ -175,25 +228,31 @@ impl<'a> Reconstruction<'a> {
             let widest = RADIUS * self.typical_size.max(self.scene.area(patch).sqrt());
             let near = self.same_surface(patch, widest);
             let radius = near.get(CELLS_IN_KERNEL).map_or(widest, |p| self.centres[p.index()].distance(centre));
-            let whole = Cell { origin: centre, normal, share: 1.0, radius };
+            let whole = Part { origin: centre, share: 1.0 };
             let witnesses: Vec<PatchId> = near.into_iter().filter(|&p| p != patch).take(12).collect();
-            let seen_from = |point: DVec3| {
-                witnesses.iter().filter(|&&w| self.sees(point, normal, w, self.centres[w.index()])).count()
-            };
-            let corners = (1..=4).map(|k| self.spread_point(patch, k));
-            if !self.covered(patch, centre)
-                && seen_from(centre) * 6 >= witnesses.len() * 5
-                && corners.into_iter().all(|c| !self.covered(patch, c) && self.sees(centre, normal, patch, c))
+            let seen = witnesses.iter().filter(|&&w| self.sees(centre, normal, w, self.centres[w.index()])).count();
+            let mut corners = (1..=4).map(|k| self.spread_point(patch, k));
+            let free = |p: DVec3| !self.covered(patch, p);
+            if free(centre)
+                && seen * 6 >= witnesses.len() * 5
+                && corners.all(|c| free(c) && self.sees(centre, normal, patch, c))
             {
-                return whole;
+                return Cell { normal, radius, parts: vec![whole] };
             }
-            // Something stands on the cell: look from the point that sees most of its neighbours.
-            let points: Vec<DVec3> = (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).collect();
-            let free: Vec<DVec3> = points.iter().copied().filter(|&p| !self.covered(patch, p)).collect();
-            let best = free.iter().copied().map(|p| (seen_from(p), p)).reduce(|a, b| if b.0 > a.0 { b } else { a });
-            let Some((_, origin)) = best else { return Cell { share: 0.0, ..whole } };
-            let seen = free.iter().filter(|&&p| p == origin || self.sees(origin, normal, patch, p)).count();
-            Cell { origin, share: seen as f64 / points.len() as f64, ..whole }
+            // Something stands on the cell: gather its free points into parts that see each other.
+            let mut points: Vec<DVec3> = (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).filter(|&p| free(p)).collect();
+            let mut parts = Vec::new();
+            while let Some(&first) = points.first() {
+                let (group, rest): (Vec<DVec3>, Vec<DVec3>) =
+                    points.iter().partition(|&&p| p == first || self.sees(first, normal, patch, p));
+                let middle = group.iter().sum::<DVec3>() / group.len() as f64;
+                let from_middle = |p: &DVec3| p.distance_squared(middle);
+                let origin = group.iter().copied().min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)));
+                let share = group.len() as f64 / f64::from(COVER_TESTS);
+                parts.push(Part { origin: origin.unwrap_or(first), share });
+                points = rest;
+            }
+            Cell { normal, radius, parts }
         })
     }
 

@@ -116,7 +116,12 @@ impl Waves {
     pub(crate) fn advance(&mut self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) {
         let size = self.wave_size(scene.len());
         let mut frozen = std::mem::take(&mut self.frozen);
-        let shares = Shares { gather: params.gather_share, environment: params.environment_share };
+        // Under a sky most power is on roofs that send it back: more rays start where they are needed instead.
+        let gather = match scene.environment() {
+            Some(_) => params.gather_share.max(0.35),
+            None => params.gather_share,
+        };
+        let shares = Shares { gather, environment: params.environment_share };
         frozen.fill(scene, glossy, self.total_area, shares, |p| self.light(scene, glossy, params, p));
         let unit = Unit::new(frozen.largest_deposit(scene), 2 * size);
         let context = context(scene, glossy, params, params.seed);
