@@ -5,6 +5,7 @@
 //! pixels that a screen shows.
 
 pub mod display;
+mod element;
 mod grid;
 pub mod image;
 pub mod picture;

@@ -623,10 +623,12 @@ fn divide(triangles: &mut [Triangle], budget: PatchBudget) -> Result<(), PatchEr
         PatchBudget::Size(size) if size > 0.0 => size * size,
         PatchBudget::Size(size) => return Err(PatchError::Size(size)),
         PatchBudget::Count(wish) => {
-            // The number of cells falls with their area: bisection on the logarithm of the area.
+            // The number of cells falls with their area: bisection on the logarithm of the area. Where there are more
+            // triangles than the wish, large ones are still cut, to cells as large as the mean triangle.
             let wish = wish.max(1) as f64;
             let total: f64 = triangles.iter().map(|t| t.cell_area * f64::from(sides(t))).sum();
-            let (mut small, mut large) = (total / wish * 1e-3, total * 2.0);
+            let all_sides: f64 = triangles.iter().map(|t| f64::from(sides(t))).sum();
+            let (mut small, mut large) = (total / wish * 1e-3, 2.0 * total / wish.max(all_sides));
             let mut best = (f64::INFINITY, large);
             for _ in 0..32 {
                 let middle = (small * large).sqrt();

@@ -1,0 +1,12 @@
+//! The command from outside: files, messages, exit codes. Every test has a folder of its own.
+//!
+//! Sizes are small: 2000 patches, 100 000 rays, 64 × 48 pixels.
+
+mod built_in;
+mod completion;
+mod faults;
+mod interrupt;
+mod pictures;
+mod real;
+mod reproducible;
+mod support;
