@@ -63,7 +63,8 @@ pub struct Picture {
     pub empty: f64,
 }
 
-/// A ray into a lobe counts for at most so many times the lobe's mean as the patches know it.
+/// A ray into a lobe counts for at most so many times what the patches know of the lobe: the mean of its hits, or
+/// what it would reflect of evenly distributed light.
 const FIREFLY: f64 = 6.0;
 /// One-sided backs that a camera ray passes at most.
 const MOST_BACKS: u32 = 16;
@@ -179,8 +180,9 @@ impl View<'_> {
         let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
         let lobe = match self.traced && brdf.is_glossy() {
             true => {
-                // What the patches remember bounds a single ray: a rare bright hit would be a white dot.
-                let limit = FIREFLY * smooth.lobe[1].luminance().max(0.0);
+                // What the patches know bounds a single ray: a rare bright hit would be a white dot.
+                let even = (smooth.irradiance * brdf.lobe_albedo(cosine)).luminance() / PI;
+                let limit = FIREFLY * smooth.lobe[1].luminance().max(even);
                 let traced = self.lobe_ray(&hit, patch, &brdf, -direction, u);
                 smooth.lobe[0] + traced * (limit / traced.luminance().max(1e-300)).min(1.0)
             }

@@ -42,6 +42,23 @@ struct Part {
 /// A part of an element.
 type Neighbour = (u32, u8);
 
+/// A point of a surface, with its display normal and that of its triangle.
+#[derive(Clone, Copy)]
+struct Place {
+    x: DVec3,
+    n: DVec3,
+    facet: DVec3,
+}
+
+impl Place {
+    /// How far a neighbour at `offset` with display normal `there` is off the surface: 0 in the plane of the facet,
+    /// and 0 on an arc, whose chord is perpendicular to the mean of its ends' normals.
+    fn rise(&self, offset: DVec3, there: DVec3) -> f64 {
+        let mean = (self.n + there).normalize_or(self.facet);
+        offset.dot(self.facet).abs().min(offset.dot(mean).abs())
+    }
+}
+
 /// Reconstructed light at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Smooth {
@@ -99,13 +116,14 @@ impl<'a> Reconstruction<'a> {
             1 => Some(0),
             _ => parts.iter().position(|p| self.sees(x, n, own, p.origin)),
         };
-        let near = part.and_then(|part| self.mean(own, x, n, &self.neighbours(own)[part], Kernel::Elements));
+        let place = Place { x, n, facet: self.scene.normal(patch) };
+        let near = part.and_then(|part| self.mean(own, &place, &self.neighbours(own)[part], Kernel::Elements));
         // A sliver that its own cell does not know: ask the nearest cells that the point itself can see.
         near.or_else(|| {
             let reach = 3.0 * self.radius(self.element(own));
-            let mut list = self.visible_from(x, n, self.same_surface(x, n, reach), None);
+            let mut list = self.visible_from(x, n, self.same_surface(&place, reach), None);
             list.truncate(NEIGHBOURS_OF_SLIVER);
-            self.mean(own, x, n, &list, Kernel::Wide(reach))
+            self.mean(own, &place, &list, Kernel::Wide(reach))
         })
         .unwrap_or_else(|| self.flat(patch))
     }
@@ -119,7 +137,7 @@ impl<'a> Reconstruction<'a> {
     }
 
     /// Weighted mean over neighbours; `None` if none has a weight.
-    fn mean(&self, own: u32, x: DVec3, n: DVec3, neighbours: &[Neighbour], kernel: Kernel) -> Option<Smooth> {
+    fn mean(&self, own: u32, place: &Place, neighbours: &[Neighbour], kernel: Kernel) -> Option<Smooth> {
         let own = self.element(own);
         let material = self.scene.material(own.patch) as *const _;
         let mut sum = Smooth { irradiance: Rgb::BLACK, lobe: [Rgb::BLACK; 2] };
@@ -128,15 +146,15 @@ impl<'a> Reconstruction<'a> {
             let element = self.element(other);
             let Part { origin, share } = self.parts(other)[usize::from(part)];
             let radius = if let Kernel::Wide(reach) = kernel { reach } else { self.radius(element) };
-            let offset = origin - x;
+            let offset = origin - place.x;
             let distance_squared = offset.length_squared();
             let closeness = 1.0 - distance_squared / (radius * radius);
             if closeness <= 0.0 {
                 continue;
             }
-            let rise = offset.dot(element.normal).abs().max(offset.dot(n).abs()) / distance_squared.sqrt().max(1e-12);
+            let rise = place.rise(offset, element.normal) / distance_squared.sqrt().max(1e-12);
             let plane = fade(SAME_PLANE - rise, 0.15);
-            let turn = fade(n.dot(element.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
+            let turn = fade(place.n.dot(element.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
             // A cell that is half covered says less, and says it with the error of its share.
             let trust = element.area * share * share * share;
             let weight = closeness * closeness * plane * turn * trust;
@@ -176,7 +194,7 @@ impl<'a> Reconstruction<'a> {
         self.neighbours[own as usize].get_or_init(|| {
             let here = self.element(own);
             let reach = self.radius(here) + 1.2 * self.size(here);
-            let mut near = self.same_surface(here.centre, here.normal, reach);
+            let mut near = self.same_surface(&self.place(here), reach);
             near.truncate(MOST_NEIGHBOURS);
             let of = |(k, part): (usize, &Part)| {
                 self.visible_from(part.origin, here.normal, near.clone(), Some((own, k as u8))).into_boxed_slice()
@@ -199,18 +217,22 @@ impl<'a> Reconstruction<'a> {
         elements.into_iter().filter_map(visible).collect()
     }
 
+    fn place(&self, element: &Element) -> Place {
+        Place { x: element.centre, n: element.normal, facet: self.scene.normal(element.patch) }
+    }
+
     /// Elements within `reach` of a point whose normals and places fit its surface, nearest first.
-    fn same_surface(&self, x: DVec3, n: DVec3, reach: f64) -> Vec<u32> {
+    fn same_surface(&self, place: &Place, reach: f64) -> Vec<u32> {
         let mut found: Vec<(f64, u32)> = self
             .grid
-            .near(x, reach)
+            .near(place.x, reach)
             .filter_map(|k| {
                 let other = self.element(k);
-                let offset = other.centre - x;
+                let offset = other.centre - place.x;
                 let distance = offset.length();
-                let rise = offset.dot(other.normal).abs().max(offset.dot(n).abs());
-                let fits =
-                    distance <= reach && n.dot(other.normal) > SAME_NORMAL - 0.1 && rise <= 1.5 * SAME_PLANE * distance;
+                let fits = distance <= reach
+                    && place.n.dot(other.normal) > SAME_NORMAL - 0.1
+                    && place.rise(offset, other.normal) <= 1.5 * SAME_PLANE * distance;
                 fits.then_some((distance, k))
             })
             .collect();
@@ -223,7 +245,7 @@ impl<'a> Reconstruction<'a> {
     fn sees(&self, from: DVec3, normal: DVec3, other: u32, to: DVec3) -> bool {
         let there = self.element(other).normal;
         let offset = to - from;
-        let rise = offset.dot(normal).abs().max(offset.dot(there).abs());
+        let rise = offset.dot(normal).abs().min(offset.dot(there).abs());
         let lift = 0.03 * self.elements.typical_size + 0.3 * rise;
         self.scene.visible(from + normal * lift, normal, to + there * lift, there)
     }
@@ -231,9 +253,9 @@ impl<'a> Reconstruction<'a> {
     /// The free parts of an element, judged by the patch that stands for it.
     fn parts(&self, element: u32) -> &[Part] {
         self.parts[element as usize].get_or_init(|| {
-            let Element { patch, centre, normal, .. } = *self.element(element);
-            let reach = RADIUS * self.elements.typical_size;
-            let mut witnesses = self.same_surface(centre, normal, reach);
+            let here = self.element(element);
+            let Element { patch, centre, normal, .. } = *here;
+            let mut witnesses = self.same_surface(&self.place(here), RADIUS * self.elements.typical_size);
             witnesses.retain(|&w| w != element);
             witnesses.truncate(8);
             let seen = witnesses.iter().filter(|&&w| self.sees(centre, normal, w, self.element(w).centre)).count();
