@@ -1,2 +1,118 @@
-//! Chores.
-fn main() {}
+//! Chores: `cargo xtask ci` and its parts. No tool has to be installed beside Rust itself.
+//!
+//! One line a step; the first step that fails ends the run and is named. `structure` holds the checks that need no
+//! compiler, which are tests of this crate as well.
+
+mod json;
+mod structure;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+/// A step: its name, what it does in a line, and the function.
+type Step = (&'static str, &'static str, fn() -> Result<(), String>);
+
+const STEPS: &[Step] = &[
+    ("fmt", "cargo fmt --check", fmt),
+    ("clippy", "cargo clippy, warnings are errors", clippy),
+    ("docs", "cargo doc, warnings are errors", docs),
+    ("examples", "every example of crates/twinray runs", examples),
+    ("deps", "which crate may depend on which; links and names in the documents", deps),
+];
+
+fn main() -> ExitCode {
+    let wish = std::env::args().nth(1).unwrap_or_default();
+    let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
+    if steps.is_empty() {
+        eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");
+        STEPS.iter().for_each(|(name, what, _)| eprintln!("  {name:10} {what}"));
+        return ExitCode::from(2);
+    }
+    for (name, _, run) in steps {
+        let start = Instant::now();
+        if let Err(message) = run() {
+            eprintln!("xtask {name}: FAILED: {message}");
+            return ExitCode::FAILURE;
+        }
+        eprintln!("xtask {name}: ok ({:.0} s)", start.elapsed().as_secs_f64());
+    }
+    ExitCode::SUCCESS
+}
+
+fn fmt() -> Result<(), String> {
+    run(cargo().args(["fmt", "--all", "--check"]))
+}
+
+fn clippy() -> Result<(), String> {
+    run(cargo().args(["clippy", "--quiet", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+}
+
+fn docs() -> Result<(), String> {
+    run(cargo().args(["doc", "--quiet", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+/// Runs every example in an empty folder, so that what it writes is not left behind.
+fn examples() -> Result<(), String> {
+    let mut names = Vec::new();
+    for path in structure::files(&structure::root().join("crates/twinray/examples"), "rs")? {
+        names.extend(path.file_stem().map(|s| s.to_string_lossy().into_owned()));
+    }
+    let folder = Folder::new()?;
+    for name in names {
+        let mut command = cargo();
+        let manifest = structure::root().join("Cargo.toml");
+        command.args(["run", "--quiet", "--release", "--package", "twinray", "--example", &name, "--manifest-path"]);
+        command.arg(manifest).current_dir(&folder.0);
+        // A relative target folder is meant from the root.
+        if let Some(target) = std::env::var_os("CARGO_TARGET_DIR") {
+            command.env("CARGO_TARGET_DIR", structure::root().join(target));
+        }
+        eprintln!("xtask examples: {name}");
+        run(&mut command)?;
+    }
+    Ok(())
+}
+
+fn deps() -> Result<(), String> {
+    structure::dependencies_follow_the_table()?;
+    structure::borrowed_crates_have_their_reasons()?;
+    structure::libraries_touch_nothing_outside()?;
+    structure::links_lead_somewhere()?;
+    structure::the_example_is_the_doctest()?;
+    structure::names_in_documents_exist()
+}
+
+/// The cargo that runs this program, at the root of the workspace.
+fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(structure::root());
+    command
+}
+
+fn run(command: &mut Command) -> Result<(), String> {
+    let words = command.get_args().map(|a| a.to_string_lossy());
+    let shown = format!("cargo {}", words.collect::<Vec<_>>().join(" "));
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("{shown} ended with {status}")),
+        Err(error) => Err(format!("{shown} could not be started: {error}")),
+    }
+}
+
+/// A folder that is there as long as the value.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Result<Self, String> {
+        let path = std::env::temp_dir().join(format!("twinray-xtask-{}", std::process::id()));
+        std::fs::create_dir_all(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(Path::new(&self.0));
+    }
+}

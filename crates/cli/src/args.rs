@@ -18,6 +18,7 @@ pub struct Args {
 
 /// Verbs, in the order light is computed.
 #[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "there is one value a process")]
 pub enum Command {
     /// Solve a scene and take a picture of it
     Render(RenderArgs),
@@ -36,7 +37,7 @@ pub struct LoadArgs {
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "patch_size")]
     pub patches: Option<u64>,
     /// Side of a patch in metres; inf: one patch per triangle
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     pub patch_size: Option<f64>,
     /// Treat every surface as two-sided
     #[arg(long)]
@@ -93,7 +94,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub up: Option<[f64; 3]>,
     /// Vertical field of view, degrees
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub fov: Option<f64>,
 }
 
@@ -104,7 +105,7 @@ pub struct SolveArgs {
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "time")]
     pub rays: Option<u64>,
     /// Seconds to shoot for
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time: Option<f64>,
     /// Seed of every random number
     #[arg(long, default_value_t = 1)]
@@ -248,7 +249,12 @@ fn count(text: &str) -> Result<u64, String> {
     };
     let value: f64 = digits.replace('_', "").parse().map_err(|_| "expected a count such as 5000000, 5e6 or 5M")?;
     let value = value * factor;
-    if value >= 1.0 && value <= 1e15 { Ok(value.round() as u64) } else { Err("expected 1 to 1e15".into()) }
+    if (1.0..=1e15).contains(&value) { Ok(value.round() as u64) } else { Err("expected 1 to 1e15".into()) }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && s.is_finite());
+    seconds.ok_or_else(|| "expected a positive number of seconds".into())
 }
 
 fn triple(text: &str) -> Result<[f64; 3], String> {

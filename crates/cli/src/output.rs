@@ -19,10 +19,13 @@ impl Output {
             bail!("{}: is a folder; expected the name of a file to write", path.display());
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.is_dir() {
+            bail!("{}: there is no folder {}; expected one that exists", path.display(), folder.display());
+        }
         let beside = tempfile::Builder::new()
             .prefix(".twinray-")
             .tempfile_in(folder)
-            .with_context(|| format!("{}: cannot write into this folder", folder.display()))?;
+            .with_context(|| format!("{}: cannot write into the folder {}", path.display(), folder.display()))?;
         Ok(Self { path: path.to_owned(), beside })
     }
 

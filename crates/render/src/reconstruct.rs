@@ -26,6 +26,8 @@ const SAME_PLANE: f64 = 0.35;
 const COVER_TESTS: u32 = 24;
 /// Cells of which less than this share is free say too little of their light.
 const LEAST_SHARE: f64 = 0.2;
+/// A cell with no more neighbours than this, itself included, has too little to average.
+const ALONE: usize = 2;
 /// Neighbours of a point that its own cell does not know.
 const NEIGHBOURS_OF_SLIVER: usize = 8;
 
@@ -117,15 +119,18 @@ impl<'a> Reconstruction<'a> {
             _ => parts.iter().position(|p| self.sees(x, n, own, p.origin)),
         };
         let place = Place { x, n, facet: self.scene.normal(patch) };
-        let near = part.and_then(|part| self.mean(own, &place, &self.neighbours(own)[part], Kernel::Elements));
-        // A sliver that its own cell does not know: ask the nearest cells that the point itself can see.
-        near.or_else(|| {
-            let reach = 3.0 * self.radius(self.element(own));
-            let mut list = self.visible_from(x, n, self.same_surface(&place, reach), None);
-            list.truncate(NEIGHBOURS_OF_SLIVER);
-            self.mean(own, &place, &list, Kernel::Wide(reach))
-        })
-        .unwrap_or_else(|| self.flat(patch))
+        let list = part.map_or(&[][..], |part| &self.neighbours(own)[part]);
+        let near = self.mean(own, &place, list, Kernel::Elements);
+        // A sliver that its own cell does not know, or a cell alone: ask the nearest that the point itself can see.
+        near.filter(|_| list.len() > ALONE)
+            .or_else(|| {
+                let reach = 3.0 * self.radius(self.element(own));
+                let mut list = self.visible_from(x, n, self.same_surface(&place, reach), None);
+                list.truncate(NEIGHBOURS_OF_SLIVER);
+                self.mean(own, &place, &list, Kernel::Wide(reach))
+            })
+            .or(near)
+            .unwrap_or_else(|| self.flat(patch))
     }
 
     /// Light of the patch itself.

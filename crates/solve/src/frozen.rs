@@ -1,7 +1,7 @@
 //! The state that a wave of rays starts from: every patch's outgoing light, frozen, and the choice among patches.
 //!
-//! Strategies (shares sum to 1): by power, uniformly by area, from the environment. All are one density
-//! λ_i(ω) = power_share · q_i(ω)/P + gather_share/(π A_total) at patches and
+//! Strategies (shares sum to 1): by power, evenly over area and patches, from the environment. All are one density
+//! λ_i(ω) = power_share · q_i(ω)/P + gather_share · w_i/(π A_i) at patches, w_i half A_i/A_total and half 1/K, and
 //! λ_env(ω) = environment_share · pdf_line(ω) at the sky, so one formula of the balance heuristic covers them.
 
 use std::f64::consts::PI;
@@ -17,7 +17,7 @@ use crate::transfer::Endpoint;
 /// Wishes for the strategies; what has no power gives its share to the gather.
 #[derive(Clone, Copy, Debug)]
 pub struct Shares {
-    /// Uniformly by area.
+    /// Evenly, half by area and half by number of patches.
     pub gather: f64,
     /// From the environment; 0 where it does not shine in this wave.
     pub environment: f64,
@@ -46,8 +46,8 @@ pub struct Frozen {
     power: f64,
     /// power_share / P.
     per_power: f64,
-    /// gather_share / (π A_total).
-    gather_density: f64,
+    /// gather_share / (2π A_total), and gather_share / (2π K): the latter over the patch's own area.
+    gather: [f64; 2],
     environment_share: f64,
     /// False in the later steps of the warm start, whose light is reflected only.
     emits: bool,
@@ -108,16 +108,17 @@ impl Frozen {
         let power_share = if power > 0.0 { 1.0 - self.environment_share - shares.gather } else { 0.0 };
         let gather_share = 1.0 - self.environment_share - power_share;
         self.per_power = if power > 0.0 { power_share / power } else { 0.0 };
-        self.gather_density = gather_share / (PI * total_area);
+        // By area alone the tiny patches of uneven meshes would hardly ever shoot, by number alone the large ones.
+        self.gather = [total_area, scene.len() as f64].map(|x| 0.5 * gather_share / (PI * x));
 
         // Second pass: densities.
-        for g in &mut self.directional {
-            g.cosine_density = g.cosine_density * self.per_power + self.gather_density;
+        for (&patch, g) in glossy.patches().iter().zip(&mut self.directional) {
+            g.cosine_density = g.cosine_density * self.per_power + self.gather[0] + self.gather[1] / scene.area(patch);
             g.lobe_density *= self.per_power;
         }
         let mut table = std::mem::take(&mut self.table);
         table.fill(scene.patches().map(|patch| {
-            let out = self.outgoing(glossy, patch);
+            let out = self.outgoing(scene, glossy, patch);
             scene.area(patch) * (PI * out.cosine_density + out.lobe_density)
         }));
         self.table = table;
@@ -145,13 +146,15 @@ impl Frozen {
 
     /// Outgoing light of a patch.
     #[inline]
-    pub fn outgoing(&self, glossy: &GlossyPatches, patch: PatchId) -> Outgoing {
+    pub fn outgoing(&self, scene: &PatchScene, glossy: &GlossyPatches, patch: PatchId) -> Outgoing {
         let constant = Rgb::from_f32(self.constant[patch.index()]);
         match glossy.number_of(patch) {
             None => Outgoing {
                 constant,
                 directional: None,
-                cosine_density: self.per_power * constant.luminance() + self.gather_density,
+                cosine_density: self.per_power * constant.luminance()
+                    + self.gather[0]
+                    + self.gather[1] / scene.area(patch),
                 lobe_density: 0.0,
             },
             Some(k) => {

@@ -133,7 +133,7 @@ impl WaveContext<'_> {
         let Some(shooter) = frozen.select(u[0]) else {
             return self.sky_ray(frozen, index, u, sums, unit, result);
         };
-        let outgoing = frozen.outgoing(self.glossy, shooter);
+        let outgoing = frozen.outgoing(self.scene, self.glossy, shooter);
         let mut holes = Stream::new(self.seed, STREAM_HOLES, index);
         let Some((direction, far)) =
             shoot(self.scene, shooter, &outgoing, [u[1], u[2]], [u[3], u[4]], || holes.uniform())
@@ -143,7 +143,7 @@ impl WaveContext<'_> {
         let here = outgoing.endpoint(self.scene.normal(shooter), direction);
         match far {
             Far::Patch(hit) => {
-                let there = frozen.outgoing(self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
+                let there = frozen.outgoing(self.scene, self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
                 let deposits = transfer(self.estimator, &here, &there);
                 let direct = frozen.emitted_share(self.scene, shooter, here.radiance);
                 self.deposit(hit, deposits.on_hit, deposits.on_hit * direct, -direction, 2 * index, sums, unit, result);
@@ -169,7 +169,7 @@ impl WaveContext<'_> {
         let (origin, direction) = environment.sample_line([u[1], u[2]], [u[3], u[4]]);
         let Some(hit) = self.scene.trace(origin, direction).and_then(|hit| self.scene.patch_of(&hit)) else { return };
         let sky: Endpoint = frozen.sky(self.scene, -direction);
-        let there = frozen.outgoing(self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
+        let there = frozen.outgoing(self.scene, self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
         let deposits = transfer(self.estimator, &sky, &there);
         result.tally.sky += deposits.on_hit;
         result.tally.escaped += deposits.on_shooter;

@@ -41,7 +41,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     }
     let loading = start.elapsed().as_secs_f64();
 
-    let goal = goal(&args.solve, loaded.patches.len())?;
+    let goal = goal(&args.solve, loaded.patches.len());
     let mut progress = Progress::new(goal, args.load.quiet);
     let observer = Observer::new(&loaded.patches, camera);
     let mut solver = Solver::new(&loaded.patches, params(&args.solve), Some(observer))
@@ -121,12 +121,11 @@ fn default_size(camera: &Camera) -> (u32, u32) {
     ((f64::from(DEFAULT_HEIGHT) * aspect).round() as u32, DEFAULT_HEIGHT)
 }
 
-fn goal(args: &SolveArgs, patches: usize) -> anyhow::Result<Goal> {
+fn goal(args: &SolveArgs, patches: usize) -> Goal {
     match (args.rays, args.time) {
-        (Some(n), _) => Ok(Goal::Rays(n)),
-        (None, Some(s)) if s > 0.0 && s.is_finite() => Ok(Goal::Seconds(s)),
-        (None, Some(s)) => bail!("--time {s}: expected a positive number of seconds"),
-        (None, None) => Ok(Goal::Rays(DEFAULT_RAYS_PER_PATCH * patches as u64)),
+        (Some(n), _) => Goal::Rays(n),
+        (None, Some(s)) => Goal::Seconds(s),
+        (None, None) => Goal::Rays(DEFAULT_RAYS_PER_PATCH * patches as u64),
     }
 }
 

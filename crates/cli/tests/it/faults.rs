@@ -65,9 +65,9 @@ fn options_that_make_no_sense() {
     render(&["--camera", "3"], &["--camera 3", "main"]);
     render(&["--rays", "many"], &["--rays", "many", "expected a count"]);
     render(&["--rays", "1M", "--time", "3"], &["--rays", "--time"]);
-    render(&["--time", "-3"], &["--time"]);
-    render(&["--time", "0"], &["--time 0", "expected a positive"]);
-    render(&["--patch-size", "-1"], &["--patch-size"]);
+    render(&["--time", "-3"], &["'-3' for '--time", "expected a positive"]);
+    render(&["--time", "0"], &["'0' for '--time", "expected a positive"]);
+    render(&["--patch-size", "-1"], &["patch size of -1", "expected a positive"]);
     render(&["--patch-size", "0"], &["patch size of 0", "expected a positive"]);
     render(&["--threads", "0"], &["--threads"]);
     render(&["--samples", "0"], &["--samples"]);
@@ -78,7 +78,11 @@ fn options_that_make_no_sense() {
 #[test]
 fn places_that_cannot_be_written() {
     let place = Place::new();
-    refused(&place, &["render", "cornell", "-o", "missing/picture.png"], &["missing/picture.png", "expected"]);
+    refused(
+        &place,
+        &["render", "cornell", "-o", "missing/picture.png"],
+        &["missing/picture.png", "no folder missing", "expected"],
+    );
     refused(&place, &["render", "cornell", "-o", "picture.jpg"], &["picture.jpg", "expected", ".png or .exr"]);
     refused(&place, &["render", "cornell", "-o", "picture"], &["picture", ".png or .exr"]);
     std::fs::create_dir(place.path("folder.png")).unwrap();

@@ -35,10 +35,6 @@ fn real_scenes_load() {
         let name = file.to_string_lossy();
         let run = place.run(&["info", &name, "--patches", "2000", "--json"]);
         println!("{name}: {:?}", run.code);
-        if !can_be_used(&name) {
-            assert_eq!(run.code, Some(2), "{name}: {}", run.stderr);
-            continue;
-        }
         assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
         let report = run.json();
         assert!(report["patches"].as_u64().unwrap() >= report["triangles"].as_u64().unwrap(), "{name}");
@@ -46,9 +42,4 @@ fn real_scenes_load() {
         assert!(residual.is_finite(), "{name}: {residual}");
     }
     assert!(files.len() > 10, "{files:?}");
-}
-
-/// All that have a surface to light.
-fn can_be_used(_name: &str) -> bool {
-    true
 }
