@@ -101,7 +101,7 @@ pub struct ViewArgs {
 /// Settings of the solver.
 #[derive(Debug, clap::Args)]
 pub struct SolveArgs {
-    /// Rays to shoot, such as 5000000, 5e6 or 5M [default: 200 per patch]
+    /// Rays to shoot, such as 5000000, 5e6 or 5M [default: 400 per patch]
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "time")]
     pub rays: Option<u64>,
     /// Seconds to shoot for

@@ -22,6 +22,8 @@ const MOST_NEIGHBOURS: usize = 72;
 const SAME_NORMAL: f64 = 0.8;
 /// Rise over run off the tangent plane beyond which surfaces are not the same.
 const SAME_PLANE: f64 = 0.35;
+/// A surface closer than this share of a cell covers it.
+const TOUCHING: f64 = 0.05;
 /// Points at which a suspicious cell is tested for what covers it.
 const COVER_TESTS: u32 = 24;
 /// Cells of which less than this share is free say too little of their light.
@@ -250,8 +252,8 @@ impl<'a> Reconstruction<'a> {
     fn sees(&self, from: DVec3, normal: DVec3, other: u32, to: DVec3) -> bool {
         let there = self.element(other).normal;
         let offset = to - from;
-        let rise = offset.dot(normal).abs().min(offset.dot(there).abs());
-        let lift = 0.03 * self.elements.typical_size + 0.3 * rise;
+        let rise = offset.dot(normal).abs().max(offset.dot(there).abs());
+        let lift = 0.03 * self.elements.typical_size + 0.4 * rise;
         self.scene.visible(from + normal * lift, normal, to + there * lift, there)
     }
 
@@ -294,7 +296,7 @@ impl<'a> Reconstruction<'a> {
     fn covered(&self, patch: PatchId, point: DVec3) -> bool {
         let scene = self.scene;
         scene.trace_from(patch, point, scene.normal(patch)).is_some_and(|hit| {
-            hit.t < 0.02 * self.elements.typical_size || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
+            hit.t < TOUCHING * self.elements.typical_size || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
         })
     }
 

@@ -1,8 +1,8 @@
 //! The front door of twinray: the libraries under one name.
 //!
-//! Data flows one way: [`format`] reads bytes into a [`scene::Scene`]; [`scene::PatchScene`] cuts it into patches;
+//! Data flows one way: [`mod@format`] reads bytes into a [`scene::Scene`]; [`scene::PatchScene`] cuts it into patches;
 //! [`solve::Solver`] shoots bi-directional rays; [`solve::Solution`] is the light of the whole scene; [`render`]
-//! makes pictures of it; [`format`] writes them.
+//! makes pictures of it; [`mod@format`] writes them.
 //!
 //! ```
 //! use twinray::render::{self, Exposure, PictureOptions, ToneCurve};

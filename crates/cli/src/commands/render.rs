@@ -18,7 +18,7 @@ use crate::progress::{Goal, Progress};
 use crate::{commands, interrupt};
 
 /// Rays per patch where the user does not say.
-const DEFAULT_RAYS_PER_PATCH: u64 = 200;
+const DEFAULT_RAYS_PER_PATCH: u64 = 400;
 /// Height of a picture where the user does not say.
 const DEFAULT_HEIGHT: u32 = 512;
 

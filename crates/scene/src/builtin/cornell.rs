@@ -92,7 +92,8 @@ pub fn cornell(closed: bool) -> Scene {
     let (eye_z, vertical_fov_degrees) = if closed { (0.004, 94.0) } else { (-0.8, 39.307_7) };
     let eye = DVec3::new(0.278, 0.273, eye_z);
     let camera = Camera::look_at("main", eye, eye + DVec3::Z, DVec3::Y, vertical_fov_degrees);
-    builder.finish(vec![Camera { aspect: Some(1.0), ..camera }])
+    // Enough for soft shadows; more patches would only share the same rays.
+    Scene { suggested_patches: Some(40_000), ..builder.finish(vec![Camera { aspect: Some(1.0), ..camera }]) }
 }
 
 /// A point of an outline at height `y`, in metres.

@@ -91,5 +91,6 @@ pub fn doorway() -> Scene {
 
     let (eye, target) = (DVec3::new(7.9, 1.6, 4.6), DVec3::new(4.6, 0.95, 1.7));
     let camera = Camera::look_at("main", eye, target, DVec3::Y, 56.0);
-    builder.finish(vec![Camera { aspect: Some(4.0 / 3.0), ..camera }])
+    // Enough for soft shadows; more patches would only share the same rays.
+    Scene { suggested_patches: Some(40_000), ..builder.finish(vec![Camera { aspect: Some(4.0 / 3.0), ..camera }]) }
 }

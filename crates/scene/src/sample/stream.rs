@@ -68,7 +68,7 @@ mod tests {
     fn neighbouring_seeds_purposes_and_indices_are_uncorrelated() {
         let correlation = |f: &dyn Fn(u64) -> (f64, f64)| {
             let n = 100_000;
-            (0..n).map(|i| f(i)).map(|(a, b)| (a - 0.5) * (b - 0.5) * 12.0).sum::<f64>() / (n as f64).sqrt()
+            (0..n).map(f).map(|(a, b)| (a - 0.5) * (b - 0.5) * 12.0).sum::<f64>() / (n as f64).sqrt()
         };
         let one = |s, p, i| Stream::new(s, p, i).uniform();
         // Each is a standard normal: |z| < 4 has a false-alarm rate of 6e-5.
