@@ -79,7 +79,9 @@ fn agx(c: Rgb) -> Rgb {
         0.879142973793104,
     ]);
     const STOPS: [f64; 2] = [-12.47393, 4.026069];
-    let v = INSET * DVec3::from_array(c.map(|x| x.max(0.0)).to_array());
+    // The published rows sum to one within 1e-4 only; scaled, greys stay exactly grey.
+    let white = INSET * DVec3::ONE;
+    let v = INSET * DVec3::from_array(c.map(|x| x.max(0.0)).to_array()) / white;
     let curve = |x: f64| {
         let x = ((libm::log2(x.max(1e-10)) - STOPS[0]) / (STOPS[1] - STOPS[0])).clamp(0.0, 1.0);
         let x2 = x * x;
@@ -91,7 +93,7 @@ fn agx(c: Rgb) -> Rgb {
     let v = v.max(DVec3::ZERO).powf(1.12);
     let luminance = Rgb::from_array(v.to_array()).luminance();
     let v = DVec3::splat(luminance) + (v - DVec3::splat(luminance)) * 1.18;
-    let shown = INSET.inverse() * v;
+    let shown = INSET.inverse() * (v * white);
     Rgb::from_array(shown.to_array())
 }
 
