@@ -20,6 +20,8 @@ const CUBE: f64 = 0.8;
 const SAME_NORMAL: f64 = 0.9;
 /// and they lie in a plane up to this share of it.
 const SAME_PLANE: f64 = 0.2;
+/// Height of the line of sight between them, over the typical side.
+const LIFT: f64 = 0.02;
 
 /// A patch, or small patches pooled.
 #[derive(Clone, Copy, Debug)]
@@ -69,9 +71,13 @@ impl Elements {
                 let (centre, normal) = places[p.index()];
                 let fits = |f: &&PatchId| {
                     let (c, n) = places[f.index()];
+                    let rise = (centre - c).dot(n).abs().max((centre - c).dot(normal).abs());
+                    // Layers of cloth lie as close as neighbours do: only what sees the founder is of its layer.
+                    let lift = LIFT * typical_size + 0.4 * rise;
                     n.dot(normal) > SAME_NORMAL
-                        && (centre - c).dot(n).abs() < SAME_PLANE * typical_size
+                        && rise < SAME_PLANE * typical_size
                         && std::ptr::eq(scene.material(p), scene.material(**f))
+                        && scene.visible(c + n * lift, n, centre + normal * lift, normal)
                 };
                 match founders.iter().find(fits) {
                     Some(&f) => drop(founder.insert(p, f)),
