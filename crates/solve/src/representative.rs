@@ -14,7 +14,7 @@ use twinray_scene::Rgb;
 /// The stored (I(m), ω_m) of a patch.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Representative {
-    /// I(m), W·m⁻², in any scale: it is always used over `importance_per_irradiance`.
+    /// I(m), W·m⁻²; used only scaled, as C/l · I.
     pub irradiance: Rgb,
     /// ω_m, unit vector away from the surface.
     pub wi: DVec3,
