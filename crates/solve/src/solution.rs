@@ -7,6 +7,7 @@ use glam::DVec3;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 use crate::glossy::GlossyPatches;
+use crate::patch_light::PatchLight;
 use crate::patch_radiance::Directional;
 use crate::tally::Tally;
 
@@ -118,6 +119,17 @@ impl Solution {
     /// Deposits that were dropped because they were not finite; 0 unless something is wrong.
     pub fn invalid_deposits(&self) -> u64 {
         self.tally.invalid
+    }
+
+    /// The irradiance of all patches with its error bars, as plain arrays.
+    pub fn patch_light(&self, scene: &PatchScene) -> PatchLight {
+        PatchLight {
+            area: scene.patches().map(|p| scene.area(p) as f32).collect(),
+            emits: scene.patches().map(|p| !scene.emission(p).is_black()).collect(),
+            irradiance: self.irradiance.clone(),
+            standard_error: vec![f32::INFINITY; scene.len()],
+            hits: vec![0; scene.len()],
+        }
     }
 
     /// Power that arrives on all patches, W: ΣA E.
