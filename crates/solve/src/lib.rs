@@ -14,6 +14,7 @@
 //! assert!(solver.solution().balance().residual().abs() < 0.01);
 //! ```
 
+mod error_bars;
 mod fixed;
 mod frozen;
 mod glossy;

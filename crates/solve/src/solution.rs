@@ -6,6 +6,7 @@
 use glam::DVec3;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
+use crate::error_bars::ErrorBars;
 use crate::glossy::GlossyPatches;
 use crate::patch_light::PatchLight;
 use crate::patch_radiance::Directional;
@@ -47,7 +48,8 @@ pub struct Solution {
     pub(crate) glossy: GlossyPatches,
     pub(crate) glossy_light: Vec<GlossySolution>,
     pub(crate) balance: PowerBalance,
-    pub(crate) relative_error: f64,
+    pub(crate) error_bars: ErrorBars,
+    pub(crate) hits: Vec<u32>,
     pub(crate) tally: Tally,
     pub(crate) splits_direct_light: bool,
 }
@@ -110,10 +112,21 @@ impl Solution {
         self.balance
     }
 
-    /// Estimated relative RMS error of patch irradiance, √(ΣA ΔE²/ΣA E²) of luminance without emitters: the
-    /// transport noise of independent rays. Stratification makes it too large, many bounces too small.
+    /// Estimated relative RMS error of patch irradiance, √(ΣA ΔE²/ΣA E²) of luminance without emitters.
     pub fn relative_error(&self) -> f64 {
-        self.relative_error
+        self.error_bars.relative
+    }
+
+    /// Standard error of the luminance of a patch's irradiance, W·m⁻²; infinite where no light arrived.
+    ///
+    /// About 68 % of the patches with a hundred hits or more are nearer to the truth than this, 95 % than twice this.
+    pub fn standard_error(&self, patch: PatchId) -> f64 {
+        f64::from(self.error_bars.standard_error[patch.index()])
+    }
+
+    /// Rays that brought light to a patch.
+    pub fn hits(&self, patch: PatchId) -> u32 {
+        self.hits[patch.index()]
     }
 
     /// Deposits that were dropped because they were not finite; 0 unless something is wrong.
@@ -127,8 +140,8 @@ impl Solution {
             area: scene.patches().map(|p| scene.area(p) as f32).collect(),
             emits: scene.patches().map(|p| !scene.emission(p).is_black()).collect(),
             irradiance: self.irradiance.clone(),
-            standard_error: vec![f32::INFINITY; scene.len()],
-            hits: vec![0; scene.len()],
+            standard_error: self.error_bars.standard_error.clone(),
+            hits: self.hits.clone(),
         }
     }
 

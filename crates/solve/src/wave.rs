@@ -6,16 +6,17 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use twinray_scene::sample::stream::{mix, to_unit};
 use twinray_scene::sample::{Sobol, Stream};
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use crate::fixed::{FixedSums, Unit};
+use crate::fixed::{DepositSums, FixedSums, Units};
 use crate::frozen::Frozen;
 use crate::glossy::GlossyPatches;
 use crate::params::{Estimator, Representation};
 use crate::shoot::{Far, shoot};
 use crate::tally::Tally;
-use crate::transfer::{Endpoint, transfer};
+use crate::transfer::{Endpoint, transfer, weights};
 
 /// Rays of one task: enough to make scheduling free, few enough to share out a small wave.
 const CHUNK: u64 = 2048;
@@ -27,8 +28,8 @@ const STREAM_KEYS: u64 = 2;
 /// Deposits of a wave, per patch and per glossy patch. All are A·irradiance, W, or what comes of it.
 #[derive(Debug)]
 pub struct WaveSums {
-    /// Per patch: Σ deposits.
-    pub arrived: FixedSums,
+    /// Per patch: Σ deposits, the noise field's, squares and hits.
+    pub arrived: DepositSums,
     /// Per glossy patch: Σ deposit · albedo(ω_in).
     pub reflected: FixedSums,
     /// Per glossy patch: Σ deposit · lobe(ω_in, ω_eye), of light straight from emitting patches and of all other.
@@ -42,7 +43,7 @@ impl WaveSums {
     pub fn new(patches: usize, glossy: usize) -> Self {
         let sums = FixedSums::new;
         Self {
-            arrived: sums(patches),
+            arrived: DepositSums::new(patches),
             reflected: sums(glossy),
             observed: [sums(glossy), sums(glossy)],
             importance: sums(glossy),
@@ -87,6 +88,24 @@ pub struct WaveContext<'a> {
     pub representation: Representation,
     /// Seed of the streams.
     pub seed: u64,
+    /// +1 or −1: the sign with which this half's deposits enter the noise field (`waves`).
+    pub sign: f64,
+}
+
+/// One end's share of a ray.
+#[derive(Clone, Copy, Debug)]
+struct Deposit {
+    patch: PatchId,
+    /// A · irradiance, W.
+    power: Rgb,
+    /// The part of it that comes straight from emission.
+    direct: Rgb,
+    /// The noise field's deposit, luminance.
+    noise: f64,
+    /// Where it comes from.
+    wi: DVec3,
+    /// Number of the ray and end.
+    end: u64,
 }
 
 /// Statistics of a wave, and the candidates of its glossy patches (not yet reduced).
@@ -107,7 +126,7 @@ impl WaveContext<'_> {
         first: u64,
         count: u64,
         sums: &WaveSums,
-        unit: Unit,
+        units: Units,
     ) -> WaveResult {
         let chunks: Vec<WaveResult> = (0..count.div_ceil(CHUNK))
             .into_par_iter()
@@ -115,7 +134,7 @@ impl WaveContext<'_> {
                 let mut result = WaveResult::default();
                 let start = first + chunk * CHUNK;
                 for index in start..(start + CHUNK).min(first + count) {
-                    self.ray(frozen, index, sobol.point(index), sums, unit, &mut result);
+                    self.ray(frozen, index, sobol.point(index), sums, units, &mut result);
                 }
                 result
             })
@@ -128,10 +147,10 @@ impl WaveContext<'_> {
         total
     }
 
-    fn ray(&self, frozen: &Frozen, index: u64, u: [f64; 5], sums: &WaveSums, unit: Unit, result: &mut WaveResult) {
+    fn ray(&self, frozen: &Frozen, index: u64, u: [f64; 5], sums: &WaveSums, units: Units, result: &mut WaveResult) {
         result.tally.rays += 1;
         let Some(shooter) = frozen.select(u[0]) else {
-            return self.sky_ray(frozen, index, u, sums, unit, result);
+            return self.sky_ray(frozen, index, u, sums, units, result);
         };
         let outgoing = frozen.outgoing(self.scene, self.glossy, shooter);
         let mut holes = Stream::new(self.seed, STREAM_HOLES, index);
@@ -145,11 +164,25 @@ impl WaveContext<'_> {
             Far::Patch(hit) => {
                 let there = frozen.outgoing(self.scene, self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
                 let deposits = transfer(self.estimator, &here, &there);
-                let direct = frozen.emitted_share(self.scene, shooter, here.radiance);
-                self.deposit(hit, deposits.on_hit, deposits.on_hit * direct, -direction, 2 * index, sums, unit, result);
-                let direct = frozen.emitted_share(self.scene, hit, there.radiance);
-                let d = deposits.on_shooter;
-                self.deposit(shooter, d, d * direct, direction, 2 * index + 1, sums, unit, result);
+                let [forward, backward] = weights(self.estimator, here.density, there.density);
+                let forth = Deposit {
+                    patch: hit,
+                    power: deposits.on_hit,
+                    direct: deposits.on_hit * frozen.emitted_share(self.scene, shooter, here.radiance),
+                    noise: self.sign * deposits.on_hit.luminance() + frozen.noise(shooter) * forward,
+                    wi: -direction,
+                    end: 2 * index,
+                };
+                let back = Deposit {
+                    patch: shooter,
+                    power: deposits.on_shooter,
+                    direct: deposits.on_shooter * frozen.emitted_share(self.scene, hit, there.radiance),
+                    noise: self.sign * deposits.on_shooter.luminance() + frozen.noise(hit) * backward,
+                    wi: direction,
+                    end: 2 * index + 1,
+                };
+                self.deposit(&forth, sums, units, result);
+                self.deposit(&back, sums, units, result);
             }
             Far::Back => result.tally.lost += here.radiance / here.density,
             Far::Sky => {
@@ -157,14 +190,31 @@ impl WaveContext<'_> {
                 let deposits = transfer(self.estimator, &here, &sky);
                 result.tally.escaped += deposits.on_hit;
                 result.tally.sky += deposits.on_shooter;
-                let d = deposits.on_shooter;
-                self.deposit(shooter, d, Rgb::BLACK, direction, 2 * index + 1, sums, unit, result);
+                self.deposit(
+                    &self.from_sky(shooter, deposits.on_shooter, direction, 2 * index + 1),
+                    sums,
+                    units,
+                    result,
+                );
             }
         }
     }
 
+    /// The sky's light on a patch; the sky itself has no noise.
+    fn from_sky(&self, patch: PatchId, power: Rgb, wi: DVec3, end: u64) -> Deposit {
+        Deposit { patch, power, direct: Rgb::BLACK, noise: self.sign * power.luminance(), wi, end }
+    }
+
     /// A ray from the environment: what it meets may be an outer face, whose back absorbs without being a loss.
-    fn sky_ray(&self, frozen: &Frozen, index: u64, u: [f64; 5], sums: &WaveSums, unit: Unit, result: &mut WaveResult) {
+    fn sky_ray(
+        &self,
+        frozen: &Frozen,
+        index: u64,
+        u: [f64; 5],
+        sums: &WaveSums,
+        units: Units,
+        result: &mut WaveResult,
+    ) {
         let Some(environment) = self.scene.environment() else { return };
         let (origin, direction) = environment.sample_line([u[1], u[2]], [u[3], u[4]]);
         let Some(hit) = self.scene.trace(origin, direction).and_then(|hit| self.scene.patch_of(&hit)) else { return };
@@ -173,21 +223,12 @@ impl WaveContext<'_> {
         let deposits = transfer(self.estimator, &sky, &there);
         result.tally.sky += deposits.on_hit;
         result.tally.escaped += deposits.on_shooter;
-        self.deposit(hit, deposits.on_hit, Rgb::BLACK, -direction, 2 * index, sums, unit, result);
+        self.deposit(&self.from_sky(hit, deposits.on_hit, -direction, 2 * index), sums, units, result);
     }
 
-    /// Adds a deposit to all sums of a patch; `direct` is the part of it that comes straight from emission.
-    fn deposit(
-        &self,
-        patch: PatchId,
-        deposit: Rgb,
-        direct: Rgb,
-        wi: DVec3,
-        end: u64,
-        sums: &WaveSums,
-        unit: Unit,
-        result: &mut WaveResult,
-    ) {
+    /// Adds a deposit to all sums of its patch.
+    fn deposit(&self, d: &Deposit, sums: &WaveSums, units: Units, result: &mut WaveResult) {
+        let &Deposit { patch, power: deposit, direct, wi, end, .. } = d;
         if deposit.is_black() {
             return;
         }
@@ -195,30 +236,28 @@ impl WaveContext<'_> {
             result.tally.invalid += 1;
             return;
         }
-        sums.arrived.add(patch.index(), deposit, unit);
+        let dither = to_unit(mix(self.seed ^ end));
+        sums.arrived.add(patch.index(), deposit, d.noise, dither, units);
         let area = self.scene.area(patch);
         let n = self.scene.normal(patch);
         let brdf = self.scene.brdf(patch);
         let albedo = brdf.albedo(n.dot(wi));
         result.tally.arrived += deposit;
         result.tally.absorbed += deposit * (Rgb::WHITE - albedo);
-        if self.scene.emission(patch).is_black() {
-            result.tally.squares += deposit.luminance().powi(2) / area;
-        }
         let Some(k) = self.glossy.number_of(patch) else { return };
-        sums.reflected.add(k, deposit * albedo, unit);
+        sums.reflected.add(k, deposit * albedo, units.deposit);
         if self.representation == Representation::Main {
             return;
         }
         if let Some(eye) = self.glossy.to_eye(k) {
             let lobe = brdf.lobe_eval(n, wi, eye);
-            sums.observed[0].add(k, direct * lobe, unit);
-            sums.observed[1].add(k, (deposit - direct) * lobe, unit);
+            sums.observed[0].add(k, direct * lobe, units.deposit);
+            sums.observed[1].add(k, (deposit - direct) * lobe, units.deposit);
         }
         let weight = if self.representation == Representation::Sample { albedo } else { brdf.lobe_albedo(n.dot(wi)) };
         let importance = (deposit * weight).luminance();
         if importance > 0.0 {
-            sums.importance.add(k, Rgb::new(importance, 0.0, 0.0), unit);
+            sums.importance.add(k, Rgb::new(importance, 0.0, 0.0), units.deposit);
             let uniform = Stream::new(self.seed, STREAM_KEYS, end).uniform();
             let key = -libm::log(1.0 - uniform) / importance;
             result.candidates.push(Candidate {

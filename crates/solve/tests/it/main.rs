@@ -1,11 +1,14 @@
 //! The solver against what is known: analytic scenes, conservation laws, and itself by other means.
 
 mod analytic;
+mod convergence;
 mod determinism;
+mod error_bars;
 mod estimators;
 mod representation;
+mod strategies;
 
-use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Rgb, Scene};
+use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Rgb, Scene, Surface, Texel, builtin};
 use twinray_solve::{Params, Solution, Solver};
 
 /// A scene cut into about `patches` patches.
@@ -27,4 +30,22 @@ fn mean_irradiance(scene: &PatchScene, solution: &Solution, which: impl Fn(twinr
         area += scene.area(p);
     }
     sum / area
+}
+
+/// Cornell's box with a floor and blocks that shine: a lacquer of roughness 0.35.
+fn glossy_cornell() -> Scene {
+    let mut scene = builtin::cornell(false);
+    for material in scene.materials.iter_mut().filter(|m| m.emission.is_black()) {
+        let Surface::Lambertian { reflectance } = &material.surface else { continue };
+        material.surface = Surface::MetallicRoughness {
+            base_color: Texel::constant(reflectance.factor),
+            metallic: 0.0,
+            roughness: 0.35,
+            metallic_roughness_texture: None,
+            specular: 1.0,
+            specular_color: Rgb::WHITE,
+            ior: 1.8,
+        };
+    }
+    scene
 }
