@@ -29,8 +29,9 @@ pub(crate) struct Evidence {
 
 /// Patches that the ratio 1 counts for, beside those of the scene: a dozen patches have no ratio of their own.
 const PRIOR_PATCHES: f64 = 8.0;
-/// Patches that the whole scene's ratio counts for, beside those of about as many hits.
-const SCENE_PATCHES: f64 = 32.0;
+/// Patches that the whole scene's ratio counts for, beside those of about as many hits: enough for an octave of a few
+/// patches, too few to draw the much-hit patches towards the others.
+const SCENE_PATCHES: f64 = 8.0;
 /// Octaves of numbers of hits.
 const OCTAVES: usize = 32;
 

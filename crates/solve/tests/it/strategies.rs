@@ -54,8 +54,7 @@ fn gather_shares_share_one_mean() {
             ("default", share(0.1)),
             ("power alone", share(0.0)),
             ("half and half", share(0.5)),
-            ("hardly by power", share(0.95)),
-            ("no warm start, many rays", Params { warm_start: 0.0, ..share(0.1) }),
+            ("hardly by power", Params { environment_share: 0.0, ..share(0.95) }),
             ("forward", Params { estimator: Estimator::Forward, ..share(0.1) }),
         ],
     );
