@@ -102,11 +102,14 @@ pub struct ViewArgs {
 #[derive(Debug, clap::Args)]
 pub struct SolveArgs {
     /// Rays to shoot, such as 5000000, 5e6 or 5M [default: 400 per patch]
-    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "time")]
+    #[arg(long, value_name = "N", value_parser = count, conflicts_with_all = ["time", "error"])]
     pub rays: Option<u64>,
     /// Seconds to shoot for
-    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true, conflicts_with = "error")]
     pub time: Option<f64>,
+    /// Shoot until the estimated error is below this, such as 2%: relative RMS of patch irradiance, weighted by area
+    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true)]
+    pub error: Option<f64>,
     /// Seed of every random number
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -257,6 +260,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "expected a positive number of seconds".into())
 }
 
+/// A share between 0 and 1 that may be written as 2% or 0.02.
+fn share(text: &str) -> Result<f64, String> {
+    let (digits, unit) = text.strip_suffix('%').map_or((text, 1.0), |digits| (digits, 0.01));
+    let share = digits.trim().parse().ok().map(|x: f64| x * unit).filter(|x| *x > 0.0 && *x < 1.0);
+    share.ok_or_else(|| "expected a share such as 2% or 0.02, more than 0 and less than 100%".into())
+}
+
 fn triple(text: &str) -> Result<[f64; 3], String> {
     let expected = "expected three numbers such as 1.5,0,-2";
     let numbers: Vec<f64> =
@@ -299,6 +309,8 @@ mod tests {
         assert_eq!(size("800x600"), Ok((800, 600)));
         assert!(size("0x600").is_err() && size("800").is_err());
         assert_eq!(triple("1,-2.5, 3"), Ok([1.0, -2.5, 3.0]));
+        assert!((share("2%").unwrap() - share("0.02").unwrap()).abs() < 1e-15);
+        assert!(["0", "-1%", "100%", "2", "nan", ""].iter().all(|text| share(text).is_err()));
         assert!(triple("1,2").is_err() && triple("1,2,nan").is_err());
     }
 }

@@ -15,6 +15,8 @@ pub enum Goal {
     Rays(u64),
     /// Seconds.
     Seconds(f64),
+    /// A relative error, as estimated.
+    Error(f64),
 }
 
 /// Progress of one solve.
@@ -53,11 +55,12 @@ impl Progress {
         self.start.elapsed().as_secs_f64()
     }
 
-    /// True once the goal is reached.
-    pub fn is_reached(&self, rays: u64) -> bool {
+    /// True once the goal is reached; the error is asked for only where it is the goal.
+    pub fn is_reached(&self, rays: u64, relative_error: impl FnOnce() -> f64) -> bool {
         match self.goal {
             Goal::Rays(n) => rays >= n,
             Goal::Seconds(s) => self.seconds() >= s,
+            Goal::Error(e) => relative_error() <= e,
         }
     }
 
@@ -77,6 +80,11 @@ impl Progress {
         let (share, left) = match self.goal {
             Goal::Rays(n) => (rays as f64 / n as f64, n.saturating_sub(rays) as f64 / rate),
             Goal::Seconds(s) => (seconds / s, (s - seconds).max(0.0)),
+            // The error falls as the root of rays, or a little faster.
+            Goal::Error(e) => {
+                let share = (e / relative_error.max(1e-12)).powi(2).min(1.0);
+                (share, seconds * (1.0 / share - 1.0))
+            }
         };
         let message = format!(
             "{} rays  {:.2} M/s  error ≈ {:.2} %  {} left",

@@ -47,7 +47,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let mut solver = Solver::new(&loaded.patches, params(&args.solve), Some(observer))
         .map_err(|e| anyhow!("{}: {e}", args.load.scene))?;
     let limit = if let Goal::Rays(n) = goal { n } else { u64::MAX };
-    while !progress.is_reached(solver.rays()) && !interrupt::requested() {
+    let at_start = solver.rays();
+    // The warm start alone is too coarse to be judged: at least one wave is shot.
+    let error = |solver: &Solver| if solver.rays() > at_start { solver.relative_error() } else { f64::INFINITY };
+    while !progress.is_reached(solver.rays(), || error(&solver)) && !interrupt::requested() {
         solver.advance(limit);
         if progress.wants_update() {
             progress.update(solver.rays(), solver.relative_error());
@@ -122,10 +125,11 @@ fn default_size(camera: &Camera) -> (u32, u32) {
 }
 
 fn goal(args: &SolveArgs, patches: usize) -> Goal {
-    match (args.rays, args.time) {
-        (Some(n), _) => Goal::Rays(n),
-        (None, Some(s)) => Goal::Seconds(s),
-        (None, None) => Goal::Rays(DEFAULT_RAYS_PER_PATCH * patches as u64),
+    match (args.rays, args.time, args.error) {
+        (Some(n), ..) => Goal::Rays(n),
+        (None, Some(s), _) => Goal::Seconds(s),
+        (None, None, Some(e)) => Goal::Error(e),
+        (None, None, None) => Goal::Rays(DEFAULT_RAYS_PER_PATCH * patches as u64),
     }
 }
 
