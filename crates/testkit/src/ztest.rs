@@ -1,6 +1,6 @@
 //! Means with standard errors, and tests of whether two of them agree.
 
-use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Mean and standard error of independent samples.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,17 @@ pub fn two_sided(z: f64) -> f64 {
     2.0 * Normal::new(0.0, 1.0).expect("standard normal").sf(z.abs())
 }
 
+/// Two-sided p-value of Student's statistic: a deviation in units of an error that was estimated with so many degrees
+/// of freedom.
+pub fn student(t: f64, degrees_of_freedom: f64) -> f64 {
+    2.0 * StudentsT::new(0.0, 1.0, degrees_of_freedom).expect("positive degrees of freedom").sf(t.abs())
+}
+
+/// Probability that the smallest of `tests` independent p-values is at most `smallest` by chance (Šidák 1967).
+pub fn sidak(smallest: f64, tests: usize) -> f64 {
+    -f64::exp_m1(tests as f64 * f64::ln_1p(-smallest))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -44,6 +55,13 @@ mod tests {
     #[test]
     fn two_sided_matches_the_table() {
         assert!((two_sided(1.959964) - 0.05).abs() < 1e-6);
+    }
+
+    #[test]
+    fn student_and_sidak_match_the_table() {
+        assert!((student(2.0, 60.0) - 0.05).abs() < 1e-4);
+        assert!((sidak(0.05, 2) - 0.0975).abs() < 1e-12);
+        assert!((sidak(1e-12, 1000) / 1e-9 - 1.0).abs() < 1e-6);
     }
 
     #[test]
