@@ -34,27 +34,25 @@ impl Unit {
     }
 }
 
-/// What a wave leaves on its patches: Σ deposits, and what the error bars need of them.
+/// What a wave leaves on its patches: Σ deposits, and what the error bars need of them, side by side in memory.
 #[derive(Debug, Default)]
 pub struct DepositSums(Vec<PatchSums>);
 
-/// One cache line per patch, since a deposit changes all of it.
 #[derive(Debug, Default)]
-#[repr(align(64))]
 struct PatchSums {
     deposits: [AtomicI64; 3],
-    noise: AtomicI64,
     squares: AtomicI64,
     hits: AtomicU32,
 }
+
+/// Bytes of a patch's sums.
+pub(crate) const BYTES_PER_PATCH: usize = size_of::<PatchSums>();
 
 /// One patch's sums, read.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PatchTotals {
     /// Σ deposits, W.
     pub deposits: Rgb,
-    /// Σ of the noise field's deposits, W.
-    pub noise: f64,
     /// Σ 𝓛(deposit)², W².
     pub squares: f64,
     /// Number of deposits.
@@ -83,15 +81,14 @@ impl DepositSums {
         Self((0..patches).map(|_| PatchSums::default()).collect())
     }
 
-    /// Adds one deposit and its part of the noise field. Squares span twice the orders of magnitude that deposits do,
+    /// Adds one deposit. Squares span twice the orders of magnitude that deposits do,
     /// so they are rounded with `dither`, uniform in [0, 1).
     #[inline]
-    pub fn add(&self, index: usize, deposit: Rgb, noise: f64, dither: f64, units: Units) {
+    pub fn add(&self, index: usize, deposit: Rgb, dither: f64, units: Units) {
         let sums = &self.0[index];
         for (channel, v) in sums.deposits.iter().zip(deposit.to_array()) {
             channel.fetch_add(units.deposit.quantize(v), Ordering::Relaxed);
         }
-        sums.noise.fetch_add(units.deposit.quantize(noise), Ordering::Relaxed);
         let square = deposit.luminance() * deposit.luminance();
         sums.squares.fetch_add(units.square.quantize_dithered(square, dither), Ordering::Relaxed);
         sums.hits.fetch_add(1, Ordering::Relaxed);
@@ -104,7 +101,6 @@ impl DepositSums {
         let take = |sum: &AtomicI64, unit: Unit| sum.swap(0, Ordering::Relaxed) as f64 * unit.value;
         PatchTotals {
             deposits: Rgb::from_array([0, 1, 2].map(|c| take(&sums.deposits[c], units.deposit))),
-            noise: take(&sums.noise, units.deposit),
             squares: take(&sums.squares, units.square),
             hits: sums.hits.swap(0, Ordering::Relaxed),
         }
@@ -164,7 +160,7 @@ mod tests {
         let (sums, n) = (DepositSums::new(1), 1 << 16);
         // 0.02 units each: 65 536 of them give 1311 ± 36.
         let deposit = (0.02 * units.square.value).sqrt();
-        (0..n).for_each(|i| sums.add(0, Rgb::grey(deposit), 0.0, to_unit(mix(i)), units));
+        (0..n).for_each(|i| sums.add(0, Rgb::grey(deposit), to_unit(mix(i)), units));
         let mean = sums.take(0, units).squares / (n as f64 * deposit * deposit);
         assert!((mean - 1.0).abs() < 0.11, "{mean}");
     }

@@ -32,8 +32,6 @@ pub struct Light {
     pub main_part: Rgb,
     /// Directional part of a glossy patch.
     pub directional: Option<Directional>,
-    /// Luminance of the noise field's reflected radiance, W·sr⁻¹·m⁻², signed.
-    pub noise: f64,
 }
 
 /// A frozen state.
@@ -41,8 +39,6 @@ pub struct Light {
 pub struct Frozen {
     /// Per patch: E + main part.
     constant: Vec<[f32; 3]>,
-    /// Per patch: radiance of the noise field.
-    noise: Vec<f32>,
     /// Per glossy patch.
     directional: Vec<GlossyLight>,
     table: Table,
@@ -78,7 +74,6 @@ impl Frozen {
         light: impl Fn(PatchId) -> Light,
     ) {
         self.constant.clear();
-        self.noise.clear();
         self.directional.clear();
         self.emits = false;
         // First pass: radiance and the stand-in's power of every patch; glossy ones keep (cosine, lobe) for now.
@@ -89,9 +84,6 @@ impl Frozen {
             // Stored in single precision: the stored value is the state, so nothing is inconsistent.
             let constant = (l.emitted + l.main_part).to_f32();
             self.constant.push(constant);
-            // The error of a light is not larger than the light; a bound keeps the sums of a wave bounded.
-            let bound = l.main_part.luminance().abs();
-            self.noise.push(l.noise.clamp(-bound, bound) as f32);
             let mut radiosity = PI * Rgb::from_f32(constant).luminance();
             if glossy.number_of(patch).is_some() {
                 let n = scene.normal(patch);
@@ -175,12 +167,6 @@ impl Frozen {
                 }
             }
         }
-    }
-
-    /// Luminance of the noise field's radiance, the same in every direction.
-    #[inline]
-    pub fn noise(&self, patch: PatchId) -> f64 {
-        f64::from(self.noise[patch.index()])
     }
 
     /// The share of a patch's radiance that is its own emission, per channel, while it shines in this state.

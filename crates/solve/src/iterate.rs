@@ -8,9 +8,9 @@ use twinray_scene::PatchScene;
 use crate::glossy::GlossyPatches;
 use crate::observer::Observer;
 use crate::params::{Params, Schedule, SolveError};
+use crate::replicas::Replicas;
 use crate::sequential::Sequential;
 use crate::solution::Solution;
-use crate::waves::Waves;
 
 /// Rays of the paper's schedule between two looks at the clock.
 const SEQUENTIAL_STEP: u64 = 1 << 17;
@@ -27,7 +27,7 @@ pub struct Solver<'a> {
 #[derive(Debug)]
 enum State {
     Sequential(Box<Sequential>, u64),
-    Waves(Box<Waves>),
+    Waves(Box<Replicas>),
 }
 
 impl<'a> Solver<'a> {
@@ -56,7 +56,7 @@ impl<'a> Solver<'a> {
         let state = match params.schedule {
             Schedule::Paper { .. } if sky => return Err(SolveError::PaperEnvironment),
             Schedule::Paper { batch } => State::Sequential(Box::new(Sequential::new(scene, &glossy)), batch.max(1)),
-            Schedule::Waves => State::Waves(Box::new(Waves::new(scene, &glossy, &params))),
+            Schedule::Waves => State::Waves(Box::new(Replicas::new(scene, &glossy, &params))),
         };
         Ok(Self { scene, params, glossy, state })
     }
@@ -69,14 +69,14 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// One wave, or at most `limit − rays()` iterations of the paper's schedule (whole batches).
+    /// A wave in each replica, or at most `limit − rays()` iterations of the paper's schedule (whole batches).
     pub fn advance(&mut self, limit: u64) {
         match &mut self.state {
             State::Sequential(s, batch) => {
                 let rays = limit.saturating_sub(s.rays()).clamp(1, SEQUENTIAL_STEP.max(*batch));
                 s.advance(self.scene, &self.glossy, &self.params, rays, *batch);
             }
-            State::Waves(w) => w.advance(self.scene, &self.glossy, &self.params),
+            State::Waves(w) => w.advance(self.scene, &self.glossy),
         }
     }
 

@@ -23,6 +23,7 @@ mod observer;
 mod params;
 mod patch_light;
 mod patch_radiance;
+mod replicas;
 mod representative;
 pub mod select;
 mod sequential;

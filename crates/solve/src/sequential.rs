@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use crate::error_bars::{Evidence, error_bars, relative_error};
+use crate::error_bars::{Evidence, Sample};
 use crate::glossy::GlossyPatches;
 use crate::params::{Params, Representation};
 use crate::patch_radiance::{Directional, Outgoing, stand_in};
@@ -19,7 +19,7 @@ use crate::select::PowerTree;
 use crate::shoot::{Far, shoot};
 use crate::solution::{GlossySolution, Solution};
 use crate::tally::Tally;
-use crate::transfer::{transfer, weights};
+use crate::transfer::transfer;
 use crate::waves::balance;
 
 const STREAM_RAY: u64 = 16;
@@ -37,7 +37,6 @@ pub(crate) struct Sequential {
     tree: PowerTree,
     /// Per patch: Σ I, W·m⁻².
     irradiance_n: Vec<[f64; 3]>,
-    /// Per patch; even and odd rays are the two halves of the noise field.
     evidence: Vec<Evidence>,
     glossy: Vec<GlossyState>,
     tally: Tally,
@@ -61,8 +60,6 @@ struct GlossyState {
 struct Pending {
     patch: PatchId,
     deposit: Rgb,
-    /// The noise field's deposit, luminance.
-    noise: f64,
     wi: glam::DVec3,
     end: u64,
 }
@@ -127,13 +124,8 @@ impl Sequential {
             Far::Patch(hit) => {
                 let there = self.outgoing(scene, glossy, params, hit).endpoint(scene.normal(hit), -direction);
                 let d = transfer(params.estimator, &here, &there);
-                let [forward, backward] = weights(params.estimator, here.density, there.density);
-                let sign = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
-                let noise = sign * d.on_hit.luminance() + self.noise(scene, glossy, shooter) * forward;
-                self.pending.push(Pending { patch: hit, deposit: d.on_hit, noise, wi: -direction, end: 2 * index });
-                let noise = sign * d.on_shooter.luminance() + self.noise(scene, glossy, hit) * backward;
-                let (deposit, end) = (d.on_shooter, 2 * index + 1);
-                self.pending.push(Pending { patch: shooter, deposit, noise, wi: direction, end });
+                self.pending.push(Pending { patch: hit, deposit: d.on_hit, wi: -direction, end: 2 * index });
+                self.pending.push(Pending { patch: shooter, deposit: d.on_shooter, wi: direction, end: 2 * index + 1 });
             }
             Far::Back => self.tally.lost += here.radiance / here.density,
             Far::Sky => self.tally.escaped += here.radiance / here.density,
@@ -168,7 +160,6 @@ impl Sequential {
         self.tally.arrived += p.deposit;
         self.tally.absorbed += p.deposit * (Rgb::WHITE - albedo);
         let evidence = &mut self.evidence[p.patch.index()];
-        evidence.noise += p.noise;
         evidence.squares += p.deposit.luminance().powi(2);
         evidence.hits = evidence.hits.saturating_add(1);
         let sum = &mut self.irradiance_n[p.patch.index()];
@@ -250,16 +241,6 @@ impl Sequential {
         main_part_n / self.n as f64
     }
 
-    /// Luminance of the noise field's radiance: it has no colour, and is reflected as the patch's light is.
-    fn noise(&self, scene: &PatchScene, glossy: &GlossyPatches, patch: PatchId) -> f64 {
-        let arrived = Rgb::from_array(self.irradiance_n[patch.index()]).luminance();
-        if arrived <= 0.0 {
-            return 0.0;
-        }
-        let per_irradiance = self.main_part(scene, glossy, patch).luminance() / arrived;
-        self.evidence[patch.index()].noise * per_irradiance / scene.area(patch)
-    }
-
     fn outgoing(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params, patch: PatchId) -> Outgoing {
         let emitted = scene.emission(patch);
         let mut main_part = self.main_part(scene, glossy, patch);
@@ -294,12 +275,22 @@ impl Sequential {
     }
 
     pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
-        let n = self.n.max(1) as f64;
-        relative_error(scene, n, |p| self.irradiance(p).luminance(), |p| self.evidence[p.index()])
+        self.sample().relative_error(scene)
     }
 
     fn irradiance(&self, patch: PatchId) -> Rgb {
         Rgb::from_array(self.irradiance_n[patch.index()]) / self.n.max(1) as f64
+    }
+
+    /// The paper's rays are independent, so their squares need no calibration; what noise adds by being reflected is
+    /// small beside the noise of a patch's own rays.
+    fn sample(&self) -> Sample<impl Fn(PatchId) -> f64, impl Fn(PatchId) -> Evidence, fn(PatchId) -> f64> {
+        Sample {
+            rays: self.n.max(1) as f64,
+            irradiance: |p| self.irradiance(p).luminance(),
+            evidence: |p: PatchId| self.evidence[p.index()],
+            half_difference: None,
+        }
     }
 
     pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
@@ -329,8 +320,9 @@ impl Sequential {
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&self.tally, self.emitted, n),
-            error_bars: error_bars(scene, n, |p| self.irradiance(p).luminance(), |p| self.evidence[p.index()]),
+            standard_error: self.sample().standard_errors(scene),
             hits: self.evidence.iter().map(|e| e.hits).collect(),
+            relative_error: self.relative_error(scene),
             tally: self.tally,
             splits_direct_light: false,
         }

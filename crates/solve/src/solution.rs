@@ -6,7 +6,6 @@
 use glam::DVec3;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use crate::error_bars::ErrorBars;
 use crate::glossy::GlossyPatches;
 use crate::patch_light::PatchLight;
 use crate::patch_radiance::Directional;
@@ -48,8 +47,9 @@ pub struct Solution {
     pub(crate) glossy: GlossyPatches,
     pub(crate) glossy_light: Vec<GlossySolution>,
     pub(crate) balance: PowerBalance,
-    pub(crate) error_bars: ErrorBars,
+    pub(crate) standard_error: Vec<f32>,
     pub(crate) hits: Vec<u32>,
+    pub(crate) relative_error: f64,
     pub(crate) tally: Tally,
     pub(crate) splits_direct_light: bool,
 }
@@ -114,14 +114,14 @@ impl Solution {
 
     /// Estimated relative RMS error of patch irradiance, √(ΣA ΔE²/ΣA E²) of luminance without emitters.
     pub fn relative_error(&self) -> f64 {
-        self.error_bars.relative
+        self.relative_error
     }
 
     /// Standard error of the luminance of a patch's irradiance, W·m⁻²; infinite where no light arrived.
     ///
     /// About 68 % of the patches with a hundred hits or more are nearer to the truth than this, 95 % than twice this.
     pub fn standard_error(&self, patch: PatchId) -> f64 {
-        f64::from(self.error_bars.standard_error[patch.index()])
+        f64::from(self.standard_error[patch.index()])
     }
 
     /// Rays that brought light to a patch.
@@ -140,7 +140,7 @@ impl Solution {
             area: scene.patches().map(|p| scene.area(p) as f32).collect(),
             emits: scene.patches().map(|p| !scene.emission(p).is_black()).collect(),
             irradiance: self.irradiance.clone(),
-            standard_error: self.error_bars.standard_error.clone(),
+            standard_error: self.standard_error.clone(),
             hits: self.hits.clone(),
         }
     }

@@ -34,19 +34,17 @@ pub struct Deposits {
 /// with averaging the two techniques instead of adding them. Errata: `docs/paper.md`.)
 #[inline]
 pub fn transfer(estimator: Estimator, shooter: &Endpoint, hit: &Endpoint) -> Deposits {
-    let [forward, backward] = weights(estimator, shooter.density, hit.density);
-    Deposits { on_hit: shooter.radiance * forward, on_shooter: hit.radiance * backward }
-}
-
-/// What the radiances of a ray's ends are multiplied with: the shooter's for the deposit on the hit, the hit's for
-/// the deposit on the shooter.
-#[inline]
-pub fn weights(estimator: Estimator, shooter_density: f64, hit_density: f64) -> [f64; 2] {
     match estimator {
-        Estimator::Balance => [1.0 / (shooter_density + hit_density); 2],
-        Estimator::Forward => [1.0 / shooter_density, 0.0],
-        Estimator::Backward => [0.0, 1.0 / shooter_density],
-        Estimator::Equal => [0.5 / shooter_density; 2],
+        Estimator::Balance => {
+            let weight = 1.0 / (shooter.density + hit.density);
+            Deposits { on_hit: shooter.radiance * weight, on_shooter: hit.radiance * weight }
+        }
+        Estimator::Forward => Deposits { on_hit: shooter.radiance / shooter.density, on_shooter: Rgb::BLACK },
+        Estimator::Backward => Deposits { on_hit: Rgb::BLACK, on_shooter: hit.radiance / shooter.density },
+        Estimator::Equal => {
+            let weight = 0.5 / shooter.density;
+            Deposits { on_hit: shooter.radiance * weight, on_shooter: hit.radiance * weight }
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::glossy::GlossyPatches;
 use crate::params::{Estimator, Representation};
 use crate::shoot::{Far, shoot};
 use crate::tally::Tally;
-use crate::transfer::{Endpoint, transfer, weights};
+use crate::transfer::{Endpoint, transfer};
 
 /// Rays of one task: enough to make scheduling free, few enough to share out a small wave.
 const CHUNK: u64 = 2048;
@@ -28,7 +28,7 @@ const STREAM_KEYS: u64 = 2;
 /// Deposits of a wave, per patch and per glossy patch. All are A·irradiance, W, or what comes of it.
 #[derive(Debug)]
 pub struct WaveSums {
-    /// Per patch: Σ deposits, the noise field's, squares and hits.
+    /// Per patch: Σ deposits, their squares, their number.
     pub arrived: DepositSums,
     /// Per glossy patch: Σ deposit · albedo(ω_in).
     pub reflected: FixedSums,
@@ -88,24 +88,6 @@ pub struct WaveContext<'a> {
     pub representation: Representation,
     /// Seed of the streams.
     pub seed: u64,
-    /// +1 or −1: the sign with which this half's deposits enter the noise field (`waves`).
-    pub sign: f64,
-}
-
-/// One end's share of a ray.
-#[derive(Clone, Copy, Debug)]
-struct Deposit {
-    patch: PatchId,
-    /// A · irradiance, W.
-    power: Rgb,
-    /// The part of it that comes straight from emission.
-    direct: Rgb,
-    /// The noise field's deposit, luminance.
-    noise: f64,
-    /// Where it comes from.
-    wi: DVec3,
-    /// Number of the ray and end.
-    end: u64,
 }
 
 /// Statistics of a wave, and the candidates of its glossy patches (not yet reduced).
@@ -164,25 +146,20 @@ impl WaveContext<'_> {
             Far::Patch(hit) => {
                 let there = frozen.outgoing(self.scene, self.glossy, hit).endpoint(self.scene.normal(hit), -direction);
                 let deposits = transfer(self.estimator, &here, &there);
-                let [forward, backward] = weights(self.estimator, here.density, there.density);
-                let forth = Deposit {
-                    patch: hit,
-                    power: deposits.on_hit,
-                    direct: deposits.on_hit * frozen.emitted_share(self.scene, shooter, here.radiance),
-                    noise: self.sign * deposits.on_hit.luminance() + frozen.noise(shooter) * forward,
-                    wi: -direction,
-                    end: 2 * index,
-                };
-                let back = Deposit {
-                    patch: shooter,
-                    power: deposits.on_shooter,
-                    direct: deposits.on_shooter * frozen.emitted_share(self.scene, hit, there.radiance),
-                    noise: self.sign * deposits.on_shooter.luminance() + frozen.noise(hit) * backward,
-                    wi: direction,
-                    end: 2 * index + 1,
-                };
-                self.deposit(&forth, sums, units, result);
-                self.deposit(&back, sums, units, result);
+                let direct = frozen.emitted_share(self.scene, shooter, here.radiance);
+                self.deposit(
+                    hit,
+                    deposits.on_hit,
+                    deposits.on_hit * direct,
+                    -direction,
+                    2 * index,
+                    sums,
+                    units,
+                    result,
+                );
+                let direct = frozen.emitted_share(self.scene, hit, there.radiance);
+                let d = deposits.on_shooter;
+                self.deposit(shooter, d, d * direct, direction, 2 * index + 1, sums, units, result);
             }
             Far::Back => result.tally.lost += here.radiance / here.density,
             Far::Sky => {
@@ -190,19 +167,10 @@ impl WaveContext<'_> {
                 let deposits = transfer(self.estimator, &here, &sky);
                 result.tally.escaped += deposits.on_hit;
                 result.tally.sky += deposits.on_shooter;
-                self.deposit(
-                    &self.from_sky(shooter, deposits.on_shooter, direction, 2 * index + 1),
-                    sums,
-                    units,
-                    result,
-                );
+                let d = deposits.on_shooter;
+                self.deposit(shooter, d, Rgb::BLACK, direction, 2 * index + 1, sums, units, result);
             }
         }
-    }
-
-    /// The sky's light on a patch; the sky itself has no noise.
-    fn from_sky(&self, patch: PatchId, power: Rgb, wi: DVec3, end: u64) -> Deposit {
-        Deposit { patch, power, direct: Rgb::BLACK, noise: self.sign * power.luminance(), wi, end }
     }
 
     /// A ray from the environment: what it meets may be an outer face, whose back absorbs without being a loss.
@@ -223,12 +191,21 @@ impl WaveContext<'_> {
         let deposits = transfer(self.estimator, &sky, &there);
         result.tally.sky += deposits.on_hit;
         result.tally.escaped += deposits.on_shooter;
-        self.deposit(&self.from_sky(hit, deposits.on_hit, -direction, 2 * index), sums, units, result);
+        self.deposit(hit, deposits.on_hit, Rgb::BLACK, -direction, 2 * index, sums, units, result);
     }
 
-    /// Adds a deposit to all sums of its patch.
-    fn deposit(&self, d: &Deposit, sums: &WaveSums, units: Units, result: &mut WaveResult) {
-        let &Deposit { patch, power: deposit, direct, wi, end, .. } = d;
+    /// Adds a deposit to all sums of a patch; `direct` is the part of it that comes straight from emission.
+    fn deposit(
+        &self,
+        patch: PatchId,
+        deposit: Rgb,
+        direct: Rgb,
+        wi: DVec3,
+        end: u64,
+        sums: &WaveSums,
+        units: Units,
+        result: &mut WaveResult,
+    ) {
         if deposit.is_black() {
             return;
         }
@@ -236,8 +213,7 @@ impl WaveContext<'_> {
             result.tally.invalid += 1;
             return;
         }
-        let dither = to_unit(mix(self.seed ^ end));
-        sums.arrived.add(patch.index(), deposit, d.noise, dither, units);
+        sums.arrived.add(patch.index(), deposit, to_unit(mix(self.seed ^ end)), units);
         let area = self.scene.area(patch);
         let n = self.scene.normal(patch);
         let brdf = self.scene.brdf(patch);
