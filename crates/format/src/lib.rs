@@ -25,6 +25,7 @@ mod read;
 mod reference;
 mod reflectance;
 mod texture;
+mod twin;
 mod warning;
 
 pub use crate::error::FormatError;
@@ -34,4 +35,5 @@ pub use crate::limits::Limits;
 pub use crate::obj::{ObjFiles, write_obj};
 pub use crate::png::write_png;
 pub use crate::read::{Reading, Resolver, read_scene};
+pub use crate::twin::{Method, Provenance, SolutionFile, read_solution, write_solution};
 pub use crate::warning::Warning;

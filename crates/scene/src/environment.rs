@@ -26,6 +26,11 @@ impl EnvironmentLight {
         Self { environment, radius }
     }
 
+    /// What the author wrote.
+    pub(crate) fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
     /// Radiance that arrives from direction `towards` (unit, away from the scene).
     #[inline]
     pub fn radiance(&self, _towards: DVec3) -> Rgb {

@@ -7,6 +7,7 @@ pub mod camera;
 pub mod cells;
 pub mod complete;
 pub mod environment;
+mod fingerprint;
 pub mod geom;
 pub mod patch;
 pub mod rgb;

@@ -128,7 +128,7 @@ pub struct PatchScene {
     /// Per patch: triangle × 2 + side.
     owner: Vec<u32>,
     /// Per patch: mean base colour.
-    base_color: Vec<[f32; 3]>,
+    pub(crate) base_color: Vec<[f32; 3]>,
     /// Per patch: mean emitted radiance; empty if nothing emits.
     emission: Vec<[f32; 3]>,
     /// Per patch: share of its cell that is there; empty if no material has holes.
@@ -575,7 +575,7 @@ struct TriangleMeans {
     roughness: f32,
 }
 
-fn base_texel(surface: &Surface) -> &crate::authored::Texel {
+pub(crate) fn base_texel(surface: &Surface) -> &crate::authored::Texel {
     match surface {
         Surface::Lambertian { reflectance } => reflectance,
         Surface::MetallicRoughness { base_color, .. } => base_color,

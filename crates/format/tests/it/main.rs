@@ -12,3 +12,4 @@ mod pictures;
 mod real;
 mod round_trip;
 mod support;
+mod twin;
