@@ -22,7 +22,9 @@ pub struct Args {
 pub enum Command {
     /// Solve a scene and take a picture of it
     Render(RenderArgs),
-    /// Say what is in a scene: triangles, patches, power, closedness, memory, warnings
+    /// Solve a scene and keep the light of its patches in a file
+    Solve(SolutionArgs),
+    /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
     /// Write a built-in scene (or convert a file) to glTF or OBJ, so that other programs can load it
     Scene(SceneArgs),
@@ -195,6 +197,20 @@ pub struct RenderArgs {
     /// Tone curve of PNGs
     #[arg(long, value_enum, default_value = "agx")]
     pub tone: ToneArg,
+}
+
+/// `twinray solve`.
+#[derive(Debug, clap::Args)]
+pub struct SolutionArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Solver.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// Solution to write: .twin [default: SCENE.twin in this folder]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
 /// Reflections.

@@ -3,7 +3,7 @@
 use std::path::{Component, Path};
 
 use anyhow::{Context, anyhow, bail};
-use twinray::format::{self, Limits};
+use twinray::format::{self, Limits, SolutionFile};
 use twinray::scene::brdf::MIN_ALPHA;
 use twinray::scene::complete::complete;
 use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, Surface, builtin};
@@ -51,6 +51,12 @@ pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
         bail!("{name}: {fault} ({} faults in all)", faults.len());
     }
     Ok((reading.scene, reading.warnings.iter().map(ToString::to_string).collect()))
+}
+
+/// Reads a solution file.
+pub fn read_solution(name: &str) -> anyhow::Result<SolutionFile> {
+    let bytes = std::fs::read(name).with_context(|| format!("{name}: cannot be read"))?;
+    format::read_solution(name, &bytes, &Limits::default()).map_err(|e| anyhow!("{e}"))
 }
 
 /// Loads a scene for solving, completed with a camera and light where it lacks them.

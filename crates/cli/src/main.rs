@@ -15,6 +15,7 @@ use clap::Parser;
 fn main() -> ExitCode {
     let outcome = match args::Args::parse().command {
         args::Command::Render(args) => commands::render::run(&args),
+        args::Command::Solve(args) => commands::solve::run(&args),
         args::Command::Info(args) => commands::info::run(&args),
         args::Command::Scene(args) => commands::scene::run(&args),
     };

@@ -1,19 +1,23 @@
-//! `twinray info`: what is in a scene, before anything is paid for.
+//! `twinray info`: what is in a scene, before anything is paid for. Files of solutions: `solution`.
 
 use anyhow::anyhow;
 use serde_json::json;
 use twinray::solve::{Params, Solver, state_bytes};
 
 use crate::args::InfoArgs;
-use crate::commands;
+use crate::commands::{self, solution};
 use crate::failure::Ending;
 use crate::input;
+use crate::output::extension;
 
 /// Rays of the short solve behind the power balance, and of the test for closedness.
 const PROBE_RAYS: u64 = 200_000;
 
 /// Runs the command.
 pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
+    if extension(args.load.scene.as_ref()) == "twin" {
+        return solution::describe(&args.load.scene, args.load.json);
+    }
     commands::set_threads(args.load.threads);
     let loaded = input::load(&args.load, None)?;
     let patches = &loaded.patches;

@@ -3,6 +3,9 @@
 pub mod info;
 pub mod render;
 pub mod scene;
+pub mod solution;
+pub mod solve;
+pub mod solving;
 
 use serde_json::{Value, json};
 use twinray::solve::PowerBalance;

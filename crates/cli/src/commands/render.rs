@@ -3,22 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 use serde_json::json;
 use twinray::format;
 use twinray::render::{self, Exposure, Lobes, Picture, PictureOptions, ToneCurve};
 use twinray::scene::Camera;
-use twinray::solve::{Estimator, Observer, Params, Representation, Schedule, Solver};
+use twinray::solve::Observer;
 
-use crate::args::{EstimatorArg, ExposureArg, LobesArg, Preset, RenderArgs, RepresentationArg, SolveArgs, ToneArg};
+use crate::args::{ExposureArg, LobesArg, RenderArgs, ToneArg};
+use crate::commands::solving;
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
-use crate::progress::{Goal, Progress};
 use crate::{commands, interrupt};
 
-/// Rays per patch where the user does not say.
-const DEFAULT_RAYS_PER_PATCH: u64 = 400;
 /// Height of a picture where the user does not say.
 const DEFAULT_HEIGHT: u32 = 512;
 
@@ -41,34 +39,18 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     }
     let loading = start.elapsed().as_secs_f64();
 
-    let goal = goal(&args.solve, loaded.patches.len());
-    let mut progress = Progress::new(goal, args.load.quiet);
     let observer = Observer::new(&loaded.patches, camera);
-    let mut solver = Solver::new(&loaded.patches, params(&args.solve), Some(observer))
-        .map_err(|e| anyhow!("{}: {e}", args.load.scene))?;
-    let limit = if let Goal::Rays(n) = goal { n } else { u64::MAX };
-    let at_start = solver.rays();
-    // The warm start alone is too coarse to be judged: at least one wave is shot.
-    let error = |solver: &Solver| if solver.rays() > at_start { solver.relative_error() } else { f64::INFINITY };
-    while !progress.is_reached(solver.rays(), || error(&solver)) && !interrupt::requested() {
-        solver.advance(limit);
-        if progress.wants_update() {
-            progress.update(solver.rays(), solver.relative_error());
-        }
-    }
-    let interrupted = interrupt::requested();
-    progress.finish();
-    let solving = progress.seconds();
+    let solved = solving::solve(&args.solve, &args.load.scene, &loaded, Some(observer), args.load.quiet)?;
+    let solution = &solved.solution;
 
     let start = Instant::now();
-    let solution = solver.solution();
     let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
     let lobes = match args.lobes {
         LobesArg::Traced => Lobes::Traced,
         LobesArg::Patches => Lobes::Patches,
     };
     let options = PictureOptions { width, height, samples: args.samples, flat: args.flat, lobes };
-    let picture = render::render(&loaded.patches, &solution, camera, &options);
+    let picture = render::render(&loaded.patches, solution, camera, &options);
     let exposure = match args.exposure {
         ExposureArg::Auto => Exposure::Auto,
         ExposureArg::Stops(ev) => Exposure::Stops(ev),
@@ -82,13 +64,14 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
     commands::print_warnings(loss.as_slice(), args.load.quiet);
     warnings.extend(loss);
-    let rate = solution.rays() as f64 / solving.max(1e-9);
+    let rate = solved.rate();
     if !args.load.quiet {
         eprintln!("{}", commands::balance_line(&balance));
         eprintln!(
-            "{}: {} rays in {solving:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
+            "{}: {} rays in {:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
             path.display(),
             solution.rays(),
+            solved.seconds,
             rate * 1e-6,
             100.0 * solution.relative_error(),
             args.solve.seed,
@@ -100,8 +83,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
             "output": path.display().to_string(),
             "scene": loaded.name, "camera": camera.name,
             "triangles": loaded.patches.triangle_count(), "patches": loaded.patches.len(),
-            "rays": solution.rays(), "seed": args.solve.seed, "interrupted": interrupted,
-            "seconds": { "load": loading, "solve": solving, "picture": drawing },
+            "rays": solution.rays(), "seed": args.solve.seed, "interrupted": solved.interrupted,
+            "seconds": { "load": loading, "solve": solved.seconds, "picture": drawing },
             "rays_per_second": rate,
             "relative_error": solution.relative_error(),
             "invalid_deposits": solution.invalid_deposits(),
@@ -111,7 +94,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         });
         println!("{report:#}");
     }
-    Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+    Ok(if solved.interrupted { Ending::Interrupted } else { Ending::Done })
 }
 
 fn default_output(scene: &str) -> PathBuf {
@@ -122,37 +105,6 @@ fn default_output(scene: &str) -> PathBuf {
 fn default_size(camera: &Camera) -> (u32, u32) {
     let aspect = camera.aspect.filter(|a| (0.05..=20.0).contains(a)).unwrap_or(4.0 / 3.0);
     ((f64::from(DEFAULT_HEIGHT) * aspect).round() as u32, DEFAULT_HEIGHT)
-}
-
-fn goal(args: &SolveArgs, patches: usize) -> Goal {
-    match (args.rays, args.time, args.error) {
-        (Some(n), ..) => Goal::Rays(n),
-        (None, Some(s), _) => Goal::Seconds(s),
-        (None, None, Some(e)) => Goal::Error(e),
-        (None, None, None) => Goal::Rays(DEFAULT_RAYS_PER_PATCH * patches as u64),
-    }
-}
-
-fn params(args: &SolveArgs) -> Params {
-    let preset = match args.preset {
-        Preset::Default => Params::default_preset(args.seed),
-        Preset::Paper => Params { schedule: Schedule::Paper { batch: args.batch }, ..Params::paper_preset(args.seed) },
-    };
-    Params {
-        estimator: match args.estimator {
-            EstimatorArg::Forward => Estimator::Forward,
-            EstimatorArg::Backward => Estimator::Backward,
-            EstimatorArg::Equal => Estimator::Equal,
-            EstimatorArg::Balance => Estimator::Balance,
-        },
-        representation: match args.representation {
-            RepresentationArg::Main => Representation::Main,
-            RepresentationArg::Sample => Representation::Sample,
-            RepresentationArg::Both => Representation::Both,
-            RepresentationArg::Last => Representation::Last,
-        },
-        ..preset
-    }
 }
 
 fn encode(args: &RenderArgs, loaded: &Loaded, picture: &Picture, factor: f64, rays: u64, path: &Path) -> Vec<u8> {
