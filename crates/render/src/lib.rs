@@ -4,6 +4,7 @@
 //! terminal. `picture` is the paper's own image: the patches as a camera sees them; `display` turns radiance into
 //! pixels that a screen shows.
 
+pub mod compare;
 pub mod display;
 mod element;
 mod grid;

@@ -9,6 +9,7 @@ mod limits;
 mod mutation;
 mod obj;
 mod pictures;
+mod read_picture;
 mod real;
 mod round_trip;
 mod support;

@@ -1,5 +1,7 @@
 //! Pictures of scenes whose picture is known, and what smoothing must and must not do.
 
+mod flip;
+
 use std::f64::consts::PI;
 
 use twinray_render::{Picture, PictureOptions, render};
