@@ -110,7 +110,7 @@ pub struct SolveArgs {
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true, conflicts_with = "error")]
     pub time: Option<f64>,
     /// Shoot until the estimated error is below this, such as 2%: relative RMS of patch irradiance, weighted by area
-    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PERCENT", value_parser = share, allow_hyphen_values = true)]
     pub error: Option<f64>,
     /// Seed of every random number
     #[arg(long, default_value_t = 1)]

@@ -65,6 +65,11 @@ fn options_that_make_no_sense() {
     render(&["--camera", "3"], &["--camera 3", "main"]);
     render(&["--rays", "many"], &["--rays", "many", "expected a count"]);
     render(&["--rays", "1M", "--time", "3"], &["--rays", "--time"]);
+    render(&["--rays", "1M", "--error", "2%"], &["--rays", "--error"]);
+    render(&["--time", "3", "--error", "2%"], &["--time", "--error"]);
+    for share in ["0", "-1%", "100%", "2", "good"] {
+        render(&["--error", share], &["--error", share, "2% or 0.02"]);
+    }
     render(&["--time", "-3"], &["'-3' for '--time", "expected a positive"]);
     render(&["--time", "0"], &["'0' for '--time", "expected a positive"]);
     render(&["--patch-size", "-1"], &["patch size of -1", "expected a positive"]);

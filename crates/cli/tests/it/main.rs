@@ -2,6 +2,7 @@
 //!
 //! Sizes are small: 2000 patches, 100 000 rays, 64 × 48 pixels.
 
+mod accuracy;
 mod built_in;
 mod completion;
 mod faults;
