@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 #[command(name = "twinray", version, about, arg_required_else_help = true)]
 #[command(after_help = "SCENE is a .glb, .gltf or .obj file, or a built-in scene: \
     furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse.\n\
-    Exit codes: 0 done, 2 bad input, 130 interrupted with the result kept.")]
+    Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 interrupted with the result kept.")]
 pub struct Args {
     /// What to do.
     #[command(subcommand)]
@@ -26,6 +26,8 @@ pub enum Command {
     Solve(SolutionArgs),
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
+    /// Say how far a picture or a solution is from a reference
+    Compare(CompareArgs),
     /// Write a built-in scene (or convert a file) to glTF or OBJ, so that other programs can load it
     Scene(SceneArgs),
 }
@@ -248,6 +250,65 @@ pub struct InfoArgs {
     pub load: LoadArgs,
 }
 
+/// `twinray compare`.
+#[derive(Debug, clap::Args)]
+pub struct CompareArgs {
+    /// What to judge: a .png or .exr picture, or a .twin solution
+    #[arg(value_name = "A")]
+    pub test: String,
+    /// The reference, of the same kind
+    #[arg(value_name = "B")]
+    pub reference: String,
+    /// Exit with 1 if the difference is larger, such as 2% or 0.02: the metric of pictures (for psnr the least, in dB),
+    /// the relative RMS of solutions
+    #[arg(long, value_name = "LIMIT", value_parser = max_error, allow_negative_numbers = true)]
+    pub max_error: Option<MaxError>,
+    /// What --max-error is about [default: flip]
+    #[arg(long, value_enum)]
+    pub metric: Option<MetricArg>,
+    /// Picture of the visible differences to write: FLIP from black (none) to pale yellow
+    #[arg(long, value_name = "FILE.png")]
+    pub diff: Option<PathBuf>,
+    /// Threads [default: all]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Say nothing but errors: the exit code is the answer
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Measures of pictures.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum MetricArg {
+    /// Root of the mean squared difference in linear light.
+    Rmse,
+    /// Mean squared difference in linear light relative to the reference.
+    Relmse,
+    /// Peak signal-to-noise ratio of PNGs, dB.
+    Psnr,
+    /// Mean of FLIP: what somebody sees who alternates between the two.
+    Flip,
+}
+
+/// A limit, and how it was written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaxError {
+    /// The number; 0.02 for 2%.
+    pub value: f64,
+    /// True if it was written in percent.
+    pub percent: bool,
+}
+
+impl MaxError {
+    /// As it was written.
+    pub fn text(self) -> String {
+        if self.percent { format!("{}%", (1e14 * self.value).round() / 1e12) } else { self.value.to_string() }
+    }
+}
+
 /// `twinray scene`.
 #[derive(Debug, clap::Args)]
 pub struct SceneArgs {
@@ -281,6 +342,14 @@ fn share(text: &str) -> Result<f64, String> {
     let (digits, unit) = text.strip_suffix('%').map_or((text, 1.0), |digits| (digits, 0.01));
     let share = digits.trim().parse().ok().map(|x: f64| x * unit).filter(|x| *x > 0.0 && *x < 1.0);
     share.ok_or_else(|| "expected a share such as 2% or 0.02, more than 0 and less than 100%".into())
+}
+
+/// A limit that may be written as 2% or 0.02; it may be larger than 1, and 0 asks for equality.
+fn max_error(text: &str) -> Result<MaxError, String> {
+    let (digits, percent) = text.strip_suffix('%').map_or((text, false), |digits| (digits, true));
+    let value = digits.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
+    let value = value.ok_or("expected a limit such as 2% or 0.02, at least 0")?;
+    Ok(MaxError { value: if percent { value / 100.0 } else { value }, percent })
 }
 
 fn triple(text: &str) -> Result<[f64; 3], String> {
@@ -327,6 +396,10 @@ mod tests {
         assert_eq!(triple("1,-2.5, 3"), Ok([1.0, -2.5, 3.0]));
         assert!((share("2%").unwrap() - share("0.02").unwrap()).abs() < 1e-15);
         assert!(["0", "-1%", "100%", "2", "nan", ""].iter().all(|text| share(text).is_err()));
+        assert_eq!(max_error("2%"), Ok(MaxError { value: 0.02, percent: true }));
+        assert_eq!(max_error("2%").map(MaxError::text), Ok("2%".into()));
+        assert_eq!(max_error("40"), Ok(MaxError { value: 40.0, percent: false }));
+        assert!(["-1", "nan", "inf", "%", "2 %%"].iter().all(|text| max_error(text).is_err()));
         assert!(triple("1,2").is_err() && triple("1,2,nan").is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! How the command ends: 0 done, 2 bad input, 130 interrupted with the result kept.
+//! How the command ends: 0 done, 1 a limit exceeded, 2 bad input, 130 interrupted with the result kept.
 
 use std::process::ExitCode;
 
@@ -7,6 +7,8 @@ use std::process::ExitCode;
 pub enum Ending {
     /// All was done.
     Done,
+    /// All was done, and what was measured is beyond what the user allows.
+    Exceeded,
     /// Ctrl-C: what there was has been written.
     Interrupted,
 }
@@ -15,6 +17,7 @@ pub enum Ending {
 pub fn exit_code(outcome: anyhow::Result<Ending>) -> ExitCode {
     match outcome {
         Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Exceeded) => ExitCode::from(1),
         Ok(Ending::Interrupted) => ExitCode::from(130),
         Err(error) => {
             eprintln!("error: {error:#}");

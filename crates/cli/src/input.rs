@@ -1,9 +1,9 @@
-//! From a name on the command line to patches: reading, units, cameras, completion, cutting, warnings.
+//! From a name on the command line to what the file holds, and to patches: reading, units, cameras, completion, cutting, warnings.
 
 use std::path::{Component, Path};
 
 use anyhow::{Context, anyhow, bail};
-use twinray::format::{self, Limits, SolutionFile};
+use twinray::format::{self, Limits, PictureFile, SolutionFile};
 use twinray::scene::brdf::MIN_ALPHA;
 use twinray::scene::complete::complete;
 use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, Surface, builtin};
@@ -57,6 +57,12 @@ pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
 pub fn read_solution(name: &str) -> anyhow::Result<SolutionFile> {
     let bytes = std::fs::read(name).with_context(|| format!("{name}: cannot be read"))?;
     format::read_solution(name, &bytes, &Limits::default()).map_err(|e| anyhow!("{e}"))
+}
+
+/// Reads a picture.
+pub fn read_picture(name: &str) -> anyhow::Result<PictureFile> {
+    let bytes = std::fs::read(name).with_context(|| format!("{name}: cannot be read"))?;
+    format::read_picture(name, &bytes, &Limits::default()).map_err(|e| anyhow!("{e}"))
 }
 
 /// Loads a scene for solving, completed with a camera and light where it lacks them.

@@ -17,6 +17,7 @@ fn main() -> ExitCode {
         args::Command::Render(args) => commands::render::run(&args),
         args::Command::Solve(args) => commands::solve::run(&args),
         args::Command::Info(args) => commands::info::run(&args),
+        args::Command::Compare(args) => commands::compare::run(&args),
         args::Command::Scene(args) => commands::scene::run(&args),
     };
     failure::exit_code(outcome)

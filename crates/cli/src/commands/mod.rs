@@ -1,11 +1,14 @@
 //! One file a verb.
 
+pub mod compare;
+mod compare_pictures;
+mod compare_solutions;
 pub mod info;
 pub mod render;
 pub mod scene;
-pub mod solution;
+mod solution;
 pub mod solve;
-pub mod solving;
+mod solving;
 
 use serde_json::{Value, json};
 use twinray::solve::PowerBalance;
