@@ -31,7 +31,7 @@ fn a_solution_keeps_its_error_bars() {
     let args = ["solve", "cornell", "--patches", "1000", "-o", "x.twin"];
     let (error, _) = solved(&place, &args, "0.05");
     let held = place.done(&["info", "x.twin", "--json"]).json();
-    assert!((held["relative_error"].as_f64().unwrap() - error).abs() < 1e-12, "{held}");
+    assert!((held["relative_error"].as_f64().unwrap() - error).abs() < 1e-6, "{held}");
 }
 
 #[test]
