@@ -1,8 +1,8 @@
-//! What one makes of a solution: pictures for now.
+//! What one makes of a solution: pictures for now; and a path tracer to compare solutions with.
 //!
 //! Products take an immutable `Solution` and a `PatchScene`; they never touch the solver's state, no file and no
 //! terminal. `picture` is the paper's own image: the patches as a camera sees them; `display` turns radiance into
-//! pixels that a screen shows.
+//! pixels that a screen shows; `reference` needs no solution and shares no transport with the solver.
 
 pub mod compare;
 pub mod display;
@@ -11,6 +11,7 @@ mod grid;
 pub mod image;
 pub mod picture;
 mod reconstruct;
+pub mod reference;
 
 pub use display::{Exposure, ToneCurve};
 pub use image::Image;

@@ -125,7 +125,12 @@ fn film_offset(options: &PictureOptions, x: u32, y: u32, k: u32) -> [f64; 2] {
     // An additive recurrence (R2), shifted at random per pixel, is even for any number of samples.
     let place = |step: f64, shift: f64| (f64::from(k) * step + shift).fract();
     let u = [place(0.754_877_666_246_692_7, jitter.uniform()), place(0.569_840_290_998_053_3, jitter.uniform())];
-    u.map(|u| 0.5 + if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() })
+    u.map(tent)
+}
+
+/// Place across a pixel, whose middle is 0.5, from a number in [0, 1): spread by a tent of one pixel's radius.
+pub(crate) fn tent(u: f64) -> f64 {
+    0.5 + if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
 }
 
 /// Radiance, and of it the lights' part with their coverage.
@@ -219,7 +224,7 @@ impl View<'_> {
 }
 
 /// The first side that scatters: one-sided surfaces are not seen from behind, as glTF has it.
-fn first_side(scene: &PatchScene, mut origin: DVec3, direction: DVec3) -> Option<(SurfaceHit, PatchId)> {
+pub(crate) fn first_side(scene: &PatchScene, mut origin: DVec3, direction: DVec3) -> Option<(SurfaceHit, PatchId)> {
     for _ in 0..MOST_BACKS {
         let hit = scene.trace(origin, direction)?;
         if let Some(patch) = scene.patch_of(&hit) {

@@ -334,7 +334,14 @@ impl PatchScene {
 
     /// A point of the patch that is there: like [`PatchScene::cell_point`], but holes are drawn again with `redraw`.
     #[inline]
-    pub fn sample_point(&self, patch: PatchId, s: f64, t: f64, mut redraw: impl FnMut() -> f64) -> DVec3 {
+    pub fn sample_point(&self, patch: PatchId, s: f64, t: f64, redraw: impl FnMut() -> f64) -> DVec3 {
+        let place = self.sample_place(patch, s, t, redraw);
+        self.triangles[self.triangle_of(patch) as usize].point(place)
+    }
+
+    /// Barycentric weights of vertices 1 and 2 at the point of [`PatchScene::sample_point`].
+    #[inline]
+    pub fn sample_place(&self, patch: PatchId, s: f64, t: f64, mut redraw: impl FnMut() -> f64) -> [f64; 2] {
         let index = self.triangle_of(patch);
         let triangle = &self.triangles[index as usize];
         let cell = self.cell_of(patch);
@@ -348,7 +355,19 @@ impl PatchScene {
                 place = triangle.cells.point(cell, redraw(), redraw());
             }
         }
-        triangle.point(place)
+        place
+    }
+
+    /// Area of the whole cell, m², holes included.
+    #[inline]
+    pub fn cell_area(&self, patch: PatchId) -> f64 {
+        self.triangles[self.triangle_of(patch) as usize].cell_area
+    }
+
+    /// Barycentric weights of vertices 1 and 2 at (`s`, `t`) of the whole cell, holes included; uniform by area.
+    #[inline]
+    pub fn cell_place_at(&self, patch: PatchId, s: f64, t: f64) -> [f64; 2] {
+        self.triangles[self.triangle_of(patch) as usize].cells.point(self.cell_of(patch), s, t)
     }
 
     /// Emitted radiance, mean over the patch.
