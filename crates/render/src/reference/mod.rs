@@ -61,3 +61,12 @@ fn variance_of_mean(sum: f64, squares: f64, n: u32) -> f64 {
     // Rounding may leave less than nothing where all samples are equal.
     (squares - sum * sum / n).max(0.0) / (n * (n - 1.0))
 }
+
+/// √(Σ variance / Σ square) after `n` samples; what is wholly dark has no error.
+fn relative_error(variance: f64, square: f64, n: u32) -> f64 {
+    match (n < 2, square > 0.0) {
+        (true, _) => f64::INFINITY,
+        (false, true) => (variance / square).sqrt(),
+        (false, false) => 0.0,
+    }
+}

@@ -78,7 +78,7 @@ impl<'a> PatchTracer<'a> {
     }
 
     /// Relative RMS error √(ΣA·variance / ΣA·𝓛(E)²) over the patches that do not emit; over all if every one does.
-    /// Infinite before the second path and in the dark.
+    /// Infinite before the second path; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
         let scene = self.tracer.scene;
         let n = f64::from(self.paths.max(1));
@@ -92,7 +92,7 @@ impl<'a> PatchTracer<'a> {
         };
         let plain = over(false);
         let (variance, square) = if plain.1 > 0.0 { plain } else { over(true) };
-        if square > 0.0 { (variance / square).sqrt() } else { f64::INFINITY }
+        super::relative_error(variance, square, self.paths)
     }
 
     /// Paths that were dropped because their irradiance was not finite; 0 unless something is wrong.

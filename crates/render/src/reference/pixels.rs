@@ -125,7 +125,7 @@ impl<'a> PixelTracer<'a> {
     }
 
     /// Relative RMS error of the pixels' luminance, √(Σ variance / Σ 𝓛²), over pixels that no light covers; over all
-    /// pixels if there are no others. Infinite before the second path and in the dark.
+    /// pixels if there are no others. Infinite before the second path; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
         let over = |which: &dyn Fn(&PixelSums) -> bool| {
             let n = f64::from(self.samples.max(1));
@@ -135,7 +135,7 @@ impl<'a> PixelTracer<'a> {
         };
         let plain = over(&|p| p.covered == 0);
         let (variance, square) = if plain.1 > 0.0 { plain } else { over(&|_| true) };
-        if square > 0.0 { (variance / square).sqrt() } else { f64::INFINITY }
+        super::relative_error(variance, square, self.samples)
     }
 
     /// Paths that were dropped because their radiance was not finite; 0 unless something is wrong.

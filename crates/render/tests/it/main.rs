@@ -1,6 +1,8 @@
 //! Pictures of scenes whose picture is known, and what smoothing must and must not do.
 
+mod agreement;
 mod flip;
+mod reference;
 
 use std::f64::consts::PI;
 
