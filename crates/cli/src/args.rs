@@ -175,6 +175,9 @@ pub struct RenderArgs {
     /// Camera.
     #[command(flatten)]
     pub view: ViewArgs,
+    /// Method.
+    #[command(flatten)]
+    pub path: PathArgs,
     /// Solver.
     #[command(flatten)]
     pub solve: SolveArgs,
@@ -184,9 +187,6 @@ pub struct RenderArgs {
     /// Size of the picture in pixels [default: 512 high, as wide as the camera asks]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
-    /// Camera rays per pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), default_value_t = 16)]
-    pub samples: u32,
     /// Show the raw patches instead of smooth light
     #[arg(long)]
     pub flat: bool,
@@ -199,6 +199,26 @@ pub struct RenderArgs {
     /// Tone curve of PNGs
     #[arg(long, value_enum, default_value = "agx")]
     pub tone: ToneArg,
+}
+
+/// How a picture is made.
+#[derive(Debug, clap::Args)]
+pub struct PathArgs {
+    /// patches: solve, then look; path: trace paths for every pixel, slowly and without bias, for comparison
+    #[arg(long, value_enum, default_value = "patches")]
+    pub method: MethodArg,
+    /// Camera rays per pixel [default: 16]; with --method path, paths [default: 64, or until --time or --error]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub samples: Option<u32>,
+}
+
+/// Methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Solve, then look at the patches.
+    Patches,
+    /// Path tracing.
+    Path,
 }
 
 /// `twinray solve`.

@@ -11,7 +11,9 @@ pub fn install() {
         if STOP.swap(true, Ordering::SeqCst) {
             std::process::exit(130);
         }
-        eprintln!("\nstopping at the end of this wave; what there is will be written (Ctrl-C again stops at once)");
+        eprintln!(
+            "\nstopping at the end of this wave or pass; what there is will be written (Ctrl-C again stops at once)"
+        );
     });
 }
 

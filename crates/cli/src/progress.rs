@@ -24,6 +24,7 @@ pub enum Goal {
 pub struct Progress {
     start: Instant,
     goal: Goal,
+    unit: &'static str,
     shown: Shown,
     last_line: f64,
 }
@@ -47,7 +48,12 @@ impl Progress {
         } else {
             Shown::Lines
         };
-        Self { start: Instant::now(), goal, shown, last_line: 0.0 }
+        Self { start: Instant::now(), goal, unit: "rays", shown, last_line: 0.0 }
+    }
+
+    /// Counts something else than rays.
+    pub fn counting(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
     }
 
     /// Seconds since the start.
@@ -87,8 +93,9 @@ impl Progress {
             }
         };
         let message = format!(
-            "{} rays  {:.2} M/s  error ≈ {:.2} %  {} left",
+            "{} {}  {:.2} M/s  error ≈ {:.2} %  {} left",
             HumanCount(rays),
+            self.unit,
             rate * 1e-6,
             100.0 * relative_error,
             HumanDuration(Duration::from_secs_f64(left.min(1e9)))

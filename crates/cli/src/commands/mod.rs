@@ -4,6 +4,7 @@ pub mod compare;
 mod compare_pictures;
 mod compare_solutions;
 pub mod info;
+mod path;
 pub mod render;
 pub mod scene;
 mod solution;

@@ -10,13 +10,15 @@ use twinray::render::{self, Exposure, Lobes, Picture, PictureOptions, ToneCurve}
 use twinray::scene::Camera;
 use twinray::solve::Observer;
 
-use crate::args::{ExposureArg, LobesArg, RenderArgs, ToneArg};
-use crate::commands::solving;
+use crate::args::{ExposureArg, LobesArg, MethodArg, RenderArgs, ToneArg};
+use crate::commands::{path, solving};
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
 use crate::{commands, interrupt};
 
+/// Camera rays per pixel where the user does not say.
+const DEFAULT_SAMPLES: u32 = 16;
 /// Height of a picture where the user does not say.
 const DEFAULT_HEIGHT: u32 = 512;
 
@@ -25,6 +27,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
     if !matches!(extension(&path).as_str(), "png" | "exr") {
         bail!("{}: expected a name that ends in .png or .exr", path.display());
+    }
+    if args.path.method == MethodArg::Path {
+        path::check(args)?;
     }
     commands::set_threads(args.load.threads);
     interrupt::install();
@@ -39,24 +44,25 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     }
     let loading = start.elapsed().as_secs_f64();
 
+    if args.path.method == MethodArg::Path {
+        return path::run(args, &loaded, camera, output, loading);
+    }
     let observer = Observer::new(&loaded.patches, camera);
     let solved = solving::solve(&args.solve, &args.load.scene, &loaded, Some(observer), args.load.quiet)?;
     let solution = &solved.solution;
 
     let start = Instant::now();
     let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
+    let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
     let lobes = match args.lobes {
         LobesArg::Traced => Lobes::Traced,
         LobesArg::Patches => Lobes::Patches,
     };
-    let options = PictureOptions { width, height, samples: args.samples, flat: args.flat, lobes };
+    let options = PictureOptions { width, height, samples, flat: args.flat, lobes };
     let picture = render::render(&loaded.patches, solution, camera, &options);
-    let exposure = match args.exposure {
-        ExposureArg::Auto => Exposure::Auto,
-        ExposureArg::Stops(ev) => Exposure::Stops(ev),
-    };
-    let factor = exposure.factor(&picture);
-    output.write(&encode(args, &loaded, &picture, factor, solution.rays(), &path))?;
+    let factor = exposure(args).factor(&picture);
+    let how = format!("{} rays, seed {}, preset {:?}", solution.rays(), args.solve.seed, args.solve.preset);
+    output.write(&encode(args, &loaded, &picture, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
     let balance = solution.balance();
@@ -80,7 +86,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     }
     if args.load.json {
         let report = json!({
-            "output": path.display().to_string(),
+            "output": path.display().to_string(), "method": "patches",
             "scene": loaded.name, "camera": camera.name,
             "triangles": loaded.patches.triangle_count(), "patches": loaded.patches.len(),
             "rays": solution.rays(), "seed": args.solve.seed, "interrupted": solved.interrupted,
@@ -97,27 +103,37 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     Ok(if solved.interrupted { Ending::Interrupted } else { Ending::Done })
 }
 
-fn default_output(scene: &str) -> PathBuf {
+pub(super) fn default_output(scene: &str) -> PathBuf {
     let stem = Path::new(scene).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     PathBuf::from(format!("{stem}.png"))
 }
 
-fn default_size(camera: &Camera) -> (u32, u32) {
+/// Size of a picture where the user does not say.
+pub(super) fn default_size(camera: &Camera) -> (u32, u32) {
     let aspect = camera.aspect.filter(|a| (0.05..=20.0).contains(a)).unwrap_or(4.0 / 3.0);
     ((f64::from(DEFAULT_HEIGHT) * aspect).round() as u32, DEFAULT_HEIGHT)
 }
 
-fn encode(args: &RenderArgs, loaded: &Loaded, picture: &Picture, factor: f64, rays: u64, path: &Path) -> Vec<u8> {
+pub(super) fn exposure(args: &RenderArgs) -> Exposure {
+    match args.exposure {
+        ExposureArg::Auto => Exposure::Auto,
+        ExposureArg::Stops(ev) => Exposure::Stops(ev),
+    }
+}
+
+/// The bytes of the picture file; `how` says in words how the picture was made.
+pub(super) fn encode(
+    args: &RenderArgs,
+    loaded: &Loaded,
+    picture: &Picture,
+    factor: f64,
+    how: &str,
+    path: &Path,
+) -> Vec<u8> {
     let image = &picture.image;
     let software = concat!("twinray ", env!("CARGO_PKG_VERSION"));
     // The same settings give the same bytes: no date, no path, no thread count.
-    let comment = format!(
-        "scene {}, {} patches, {rays} rays, seed {}, preset {:?}",
-        loaded.name,
-        loaded.patches.len(),
-        args.solve.seed,
-        args.solve.preset
-    );
+    let comment = format!("scene {}, {} patches, {how}", loaded.name, loaded.patches.len());
     let text = [("Software", software), ("Comment", comment.as_str())];
     if extension(path) == "exr" {
         return format::write_exr(image.width, image.height, &image.pixels, None, &text);

@@ -1,0 +1,108 @@
+//! `twinray render --method path`: the picture by path tracing, in passes over all of its pixels.
+
+use std::time::Instant;
+
+use anyhow::bail;
+use serde_json::json;
+use twinray::render::reference::{PathPictureOptions, PixelTracer, Technique};
+use twinray::scene::Camera;
+
+use super::render::{default_output, default_size, encode, exposure};
+use crate::args::{Preset, RenderArgs};
+use crate::failure::Ending;
+use crate::input::Loaded;
+use crate::interrupt;
+use crate::output::Output;
+use crate::progress::{Goal, Progress};
+
+/// Paths per pixel where the user does not say how long.
+const DEFAULT_SAMPLES: u32 = 64;
+/// Paths per pixel before an estimated error is believed.
+const FIRST_SAMPLES: u32 = 16;
+
+/// Refuses settings of the solver, which would be ignored.
+pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
+    let solver = [
+        (args.solve.rays.is_some(), "--rays"),
+        (args.solve.preset == Preset::Paper, "--preset paper"),
+        (args.flat, "--flat"),
+    ];
+    match solver.iter().find(|(given, _)| *given) {
+        Some((_, option)) => {
+            bail!("{option} is for --method patches; with --method path, expected --samples, --time or --error")
+        }
+        None => Ok(()),
+    }
+}
+
+/// Traces, writes and reports.
+pub(super) fn run(
+    args: &RenderArgs,
+    loaded: &Loaded,
+    camera: &Camera,
+    output: Output,
+    loading: f64,
+) -> anyhow::Result<Ending> {
+    let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
+    let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
+    let pixels = u64::from(width) * u64::from(height);
+    // With --samples beside --time or --error, whichever is reached first.
+    let until = args.solve.time.map(Goal::Seconds).or(args.solve.error.map(Goal::Error));
+    let most = args.path.samples.unwrap_or(if until.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
+    let goal = until.unwrap_or(Goal::Rays(u64::from(most) * pixels));
+    let mut progress = Progress::new(goal, args.load.quiet).counting("paths");
+    let seed = args.solve.seed;
+    let options = PathPictureOptions { width, height, samples: most, seed, technique: Technique::Both };
+    let mut tracer = PixelTracer::new(&loaded.patches, camera, &options);
+    loop {
+        tracer.advance(1);
+        let paths = pixels * u64::from(tracer.samples());
+        if progress.wants_update() {
+            progress.update(paths, tracer.relative_error());
+        }
+        let error = || if tracer.samples() < FIRST_SAMPLES { f64::INFINITY } else { tracer.relative_error() };
+        if progress.is_reached(paths, error) || tracer.samples() >= most || interrupt::requested() {
+            break;
+        }
+    }
+    let interrupted = interrupt::requested();
+    progress.finish();
+    let tracing = progress.seconds();
+
+    let start = Instant::now();
+    let picture = tracer.picture();
+    let factor = exposure(args).factor(&picture);
+    let how = format!("{} paths per pixel, seed {seed}", tracer.samples());
+    output.write(&encode(args, loaded, &picture, factor, &how, &path))?;
+    let drawing = start.elapsed().as_secs_f64();
+
+    let paths = pixels * u64::from(tracer.samples());
+    let rate = paths as f64 / tracing.max(1e-9);
+    let error = tracer.relative_error();
+    if !args.load.quiet {
+        eprintln!(
+            "{}: {} paths per pixel in {tracing:.1} s ({:.2} M/s), estimated error of a pixel {:.2} %, seed {seed}; exposure {:+.2} EV",
+            path.display(),
+            tracer.samples(),
+            rate * 1e-6,
+            100.0 * error,
+            factor.log2(),
+        );
+    }
+    if args.load.json {
+        let report = json!({
+            "output": path.display().to_string(), "method": "path",
+            "scene": loaded.name, "camera": camera.name,
+            "triangles": loaded.patches.triangle_count(), "patches": loaded.patches.len(),
+            "paths_per_pixel": tracer.samples(), "paths": paths, "seed": seed, "interrupted": interrupted,
+            "seconds": { "load": loading, "trace": tracing, "picture": drawing },
+            "paths_per_second": rate,
+            "relative_error": error,
+            "invalid_paths": tracer.invalid(),
+            "exposure_ev": factor.log2(),
+            "warnings": loaded.warnings,
+        });
+        println!("{report:#}");
+    }
+    Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}
