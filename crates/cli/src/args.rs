@@ -24,6 +24,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Solve a scene and keep the light of its patches in a file
     Solve(SolutionArgs),
+    /// Trace the irradiance of every patch by paths, slowly and without bias, to compare solutions with
+    Reference(ReferenceArgs),
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
     /// Say how far a picture or a solution is from a reference
@@ -260,6 +262,29 @@ pub enum ToneArg {
     Agx,
     /// Clip at 1.
     None,
+}
+
+/// `twinray reference`.
+#[derive(Debug, clap::Args)]
+pub struct ReferenceArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Solution file to write: .twin [default: SCENE-reference.twin in this folder]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Paths that start on each patch [default: 256]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    pub paths: Option<u32>,
+    /// Seconds to trace for
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true, conflicts_with = "paths")]
+    pub time: Option<f64>,
+    /// Relative RMS error of the patches' irradiance to trace for, such as 2% or 0.02
+    #[arg(long, value_name = "E", value_parser = share, allow_negative_numbers = true, conflicts_with_all = ["paths", "time"])]
+    pub error: Option<f64>,
+    /// Seed of every random number
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
 }
 
 /// `twinray info`.

@@ -16,6 +16,7 @@ fn main() -> ExitCode {
     let outcome = match args::Args::parse().command {
         args::Command::Render(args) => commands::render::run(&args),
         args::Command::Solve(args) => commands::solve::run(&args),
+        args::Command::Reference(args) => commands::reference::run(&args),
         args::Command::Info(args) => commands::info::run(&args),
         args::Command::Compare(args) => commands::compare::run(&args),
         args::Command::Scene(args) => commands::scene::run(&args),

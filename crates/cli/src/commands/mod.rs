@@ -5,6 +5,7 @@ mod compare_pictures;
 mod compare_solutions;
 pub mod info;
 mod path;
+pub mod reference;
 pub mod render;
 pub mod scene;
 mod solution;

@@ -6,13 +6,35 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
+use twinray::format::{Limits, read_solution};
+
 use crate::support::{Place, shows_something};
 
 #[test]
 fn ctrl_c_writes_the_picture_and_says_so() {
     let place = Place::new();
+    let render = ["render", "cornell", "-o", "kept.png", "--patches", "2000", "--size", "64x48", "--time", "600"];
+    interrupt(&place, &render);
+    assert_eq!(place.files(), ["kept.png"]);
+    shows_something(&place.read("kept.png"));
+    interrupt(&place, &[&render[..], &["--method", "path"]].concat());
+    assert_eq!(place.files(), ["kept.png"]);
+    shows_something(&place.read("kept.png"));
+}
+
+#[test]
+fn ctrl_c_writes_the_reference() {
+    let place = Place::new();
+    interrupt(&place, &["reference", "cornell", "-o", "kept.twin", "--patches", "2000", "--error", "0.0001%"]);
+    assert_eq!(place.files(), ["kept.twin"]);
+    let kept = read_solution("kept.twin", &place.read("kept.twin"), &Limits::default()).unwrap();
+    assert!(kept.provenance.rays >= kept.light.len() as u64);
+}
+
+/// Runs the command until it tells of progress, then interrupts it.
+fn interrupt(place: &Place, args: &[&str]) {
     let mut child = Command::new(assert_cmd::cargo::cargo_bin!("twinray"))
-        .args(["render", "cornell", "-o", "kept.png", "--patches", "2000", "--size", "64x48", "--time", "600"])
+        .args(args)
         .current_dir(place.path(""))
         .stderr(Stdio::piped())
         .spawn()
@@ -47,6 +69,4 @@ fn ctrl_c_writes_the_picture_and_says_so() {
     said.extend(lines.try_iter());
     assert_eq!(status.code(), Some(130), "{said:?}");
     assert!(said.iter().any(|line| line.contains("stopping at the end of this wave")), "{said:?}");
-    assert_eq!(place.files(), ["kept.png"]);
-    shows_something(&place.read("kept.png"));
 }

@@ -9,5 +9,6 @@ mod faults;
 mod interrupt;
 mod pictures;
 mod real;
+mod reference;
 mod reproducible;
 mod support;
