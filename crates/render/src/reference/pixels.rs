@@ -36,6 +36,10 @@ impl Default for PathPictureOptions {
 /// Purpose of the streams of random numbers.
 const PIXELS: u64 = 0x9A7B_0001;
 
+/// Pixels along a side of the tiles whose logarithms count for automatic exposure: small against what a picture
+/// shows, large against its noise.
+const TILE: usize = 4;
+
 /// A picture that gets better with every pass over all of its pixels.
 pub struct PixelTracer<'a> {
     tracer: PathTracer<'a>,
@@ -94,17 +98,10 @@ impl<'a> PixelTracer<'a> {
         self.samples = end;
     }
 
-    /// The picture so far. For automatic exposure the logarithm is that of pixels: single paths are too noisy for it.
+    /// The picture so far.
     pub fn picture(&self) -> Picture {
         let n = f64::from(self.samples.max(1));
-        let (mut log2_sum, mut unlit, mut empty) = (0.0, 0.0, 0.0);
-        for p in &self.pixels {
-            empty += f64::from(p.empty);
-            if p.unlit_luminance > 0.0 {
-                unlit += f64::from(p.unlit);
-                log2_sum += f64::from(p.unlit) * libm::log2(p.unlit_luminance / f64::from(p.unlit));
-            }
-        }
+        let empty: f64 = self.pixels.iter().map(|p| f64::from(p.empty)).sum();
         let lights = |p: &PixelSums| ((p.lights / n).to_f32(), (f64::from(p.covered) / n) as f32);
         Picture {
             image: Image {
@@ -113,9 +110,25 @@ impl<'a> PixelTracer<'a> {
                 pixels: self.pixels.iter().map(|p| (p.radiance / n).to_f32()).collect(),
             },
             lights: self.pixels.iter().map(lights).collect(),
-            log2_luminance: (unlit > 0.0).then(|| log2_sum / unlit),
+            log2_luminance: self.log2_luminance(),
             empty: empty / (n * self.pixels.len().max(1) as f64),
         }
+    }
+
+    /// Mean of log₂ luminance for automatic exposure, where camera rays met surfaces without emission. The logarithm is
+    /// that of tiles: of single paths, or of pixels of a few, it would be darker by all of their noise.
+    fn log2_luminance(&self) -> Option<f64> {
+        let width = self.options.width as usize;
+        let columns = width.div_ceil(TILE);
+        let mut tiles = vec![(0.0, 0.0); columns * (self.options.height as usize).div_ceil(TILE)];
+        for (index, p) in self.pixels.iter().enumerate() {
+            let tile = &mut tiles[index / width / TILE * columns + index % width / TILE];
+            tile.0 += f64::from(p.unlit);
+            tile.1 += p.unlit_luminance;
+        }
+        let lit = tiles.iter().filter(|(_, luminance)| *luminance > 0.0);
+        let (rays, sum) = lit.fold((0.0, 0.0), |(rays, sum), (n, l)| (rays + n, sum + n * libm::log2(l / n)));
+        (rays > 0.0).then(|| sum / rays)
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
