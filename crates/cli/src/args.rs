@@ -18,7 +18,6 @@ pub struct Args {
 
 /// Verbs, in the order light is computed.
 #[derive(Debug, Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "there is one value a process")]
 pub enum Command {
     /// Solve a scene and take a picture of it
     Render(RenderArgs),

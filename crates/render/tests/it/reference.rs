@@ -283,9 +283,9 @@ fn standard_errors_are_right() {
         let luminances = picture.image.pixels.iter().map(|c| Rgb::from_f32(*c).luminance());
         luminances.zip(variance).map(|(l, v)| (l, f64::from(v))).collect()
     };
-    let all: [(&str, &dyn Fn(u64) -> Vec<(f64, f64)>); 2] = [("patches", &patches), ("pixels", &pixels)];
-    for (name, run) in all {
-        let runs: Vec<Vec<(f64, f64)>> = (0..SEEDS).map(run).collect();
+    let patches: Vec<Vec<(f64, f64)>> = (0..SEEDS).map(patches).collect();
+    let pixels: Vec<Vec<(f64, f64)>> = (0..SEEDS).map(pixels).collect();
+    for (name, runs) in [("patches", patches), ("pixels", pixels)] {
         let ratio = (0..runs[0].len()).filter_map(|i| {
             let values: Vec<f64> = runs.iter().map(|r| r[i].0).collect();
             let claimed = runs.iter().map(|r| r[i].1).sum::<f64>() / SEEDS as f64;
