@@ -12,5 +12,6 @@ mod pictures;
 mod read_picture;
 mod real;
 mod round_trip;
+mod seeds;
 mod support;
 mod twin;
