@@ -136,12 +136,17 @@ pub struct PatchScene {
     centre: DVec3,
     radius: f64,
     passed: usize,
+    degenerate: usize,
 }
+
+/// Largest magnitude of a coordinate that the ray kernel meets; what lies beyond must not become a patch either.
+const MAX_COORDINATE: f32 = 1e18;
 
 impl PatchScene {
     /// Cuts `scene` into patches and builds its ray kernel.
     ///
-    /// Transmissive surfaces are left out: light and sight pass straight through them.
+    /// Transmissive surfaces are left out: light and sight pass straight through them. So are triangles without area
+    /// and those with a vertex that is not a number or beyond 1e18: [`PatchScene::degenerate_triangles`].
     ///
     /// # Errors
     /// If there is no surface, or more patches than can be numbered.
@@ -153,6 +158,7 @@ impl PatchScene {
         let mut triangles = Vec::new();
         let mut attributes = Vec::new();
         let mut passed = 0;
+        let mut degenerate = 0;
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh];
             let material = &scene.materials[mesh.material];
@@ -171,7 +177,9 @@ impl PatchScene {
                 let vertices = corner.map(|k| world[k].as_vec3().to_array());
                 let [a, b, c] = vertices.map(vec);
                 let across = area_vector_2(a, b, c);
-                if !(across.length() > 0.0 && across.is_finite()) {
+                let in_range = vertices.iter().flatten().all(|x| x.abs() <= MAX_COORDINATE);
+                if !(in_range && across.length() > 0.0) {
+                    degenerate += 1;
                     continue;
                 }
                 triangles.push(Triangle {
@@ -221,7 +229,9 @@ impl PatchScene {
             centre,
             radius,
             passed,
+            degenerate,
         };
+        debug_assert_eq!(this.kernel.left_out(), 0, "a patch that no ray can meet");
         this.average_materials();
         Ok(this)
     }
@@ -244,6 +254,11 @@ impl PatchScene {
     /// Number of transmissive triangles that were left out.
     pub fn transmissive_triangles(&self) -> usize {
         self.passed
+    }
+
+    /// Number of triangles that were left out because, where they are placed, they have no area or no finite place.
+    pub fn degenerate_triangles(&self) -> usize {
+        self.degenerate
     }
 
     /// What to subtract from a world position to get this scene's coordinates.

@@ -2,8 +2,9 @@
 //!
 //! Readers give sound scenes; scenes built by hand go through here before they are cut into patches.
 
-use crate::authored::{Environment, Scene, Surface, Texel, TextureRef};
+use crate::authored::{Environment, Scene, Surface, Texel, TextureImage, TextureRef};
 use crate::rgb::Rgb;
+use crate::texture::srgb_to_linear;
 
 /// One fault: which element, what is wrong, what was expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -57,11 +58,14 @@ impl Scene {
                     (vec![base_color.factor], all)
                 }
                 Surface::Phong { diffuse, specular, .. } => {
-                    (vec![diffuse.factor + *specular, diffuse.factor, *specular], textures(&[diffuse]))
+                    let image = diffuse.texture.as_ref().and_then(|t| self.images.get(t.image));
+                    let brightest = image.map_or(Rgb::WHITE, |i| brightest_texel(i));
+                    (vec![diffuse.factor * brightest + *specular, diffuse.factor, *specular], textures(&[diffuse]))
                 }
             };
             for c in colors {
-                if !c.is_finite() || c.min_channel() < 0.0 || c.max_channel() > 1.0 {
+                // A sum whose parts were fitted to each other may round to a little more than 1.
+                if !c.is_finite() || c.min_channel() < 0.0 || c.max_channel() > 1.0 + 1e-12 {
                     fault(element(), format!("reflectance {:?}, expected 0 to 1", c.to_array()));
                 }
             }
@@ -89,6 +93,15 @@ impl Scene {
     }
 }
 
+/// Largest value of each channel: two lobes share a surface's light, and a dark texture leaves room for the other.
+fn brightest_texel(image: &TextureImage) -> Rgb {
+    let mut brightest = [0u8; 3];
+    for texel in image.rgba.chunks_exact(4) {
+        brightest.iter_mut().zip(texel).for_each(|(most, &t)| *most = t.max(*most));
+    }
+    Rgb::from_array(brightest.map(|b| srgb_to_linear(f64::from(b) / 255.0)))
+}
+
 fn textures<'a>(texels: &[&'a Texel]) -> Vec<&'a TextureRef> {
     texels.iter().filter_map(|t| t.texture.as_ref()).collect()
 }
@@ -96,8 +109,9 @@ fn textures<'a>(texels: &[&'a Texel]) -> Vec<&'a TextureRef> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::authored::{Instance, Material, Mesh};
+    use crate::authored::{Instance, Material, Mesh, Wrap};
     use glam::DAffine3;
+    use std::sync::Arc;
 
     #[test]
     fn every_fault_is_listed() {
@@ -116,6 +130,23 @@ mod tests {
         assert_eq!(faults.iter().filter(|f| f.starts_with("mesh 0")).count(), 3);
         assert_eq!(faults.iter().filter(|f| f.starts_with("instance 0")).count(), 1);
         assert_eq!(faults.iter().filter(|f| f.starts_with("material 0")).count(), 1);
+    }
+
+    /// A factor of 1 and a lobe of 0.5 are too much, unless the texture is dark.
+    #[test]
+    fn two_lobes_share_the_light_of_the_brightest_texel() {
+        let texture = TextureRef { image: 0, wrap: [Wrap::Repeat; 2], nearest: true };
+        let diffuse = Texel { factor: Rgb::WHITE, texture: Some(texture) };
+        let surface = Surface::Phong { diffuse, specular: Rgb::grey(0.5), exponent: 10.0 };
+        for (byte, faults) in [(100u8, 0), (255, 1)] {
+            let rgba = vec![byte, byte, byte, 255];
+            let scene = Scene {
+                images: vec![Arc::new(TextureImage { name: "t".into(), width: 1, height: 1, rgba })],
+                materials: vec![Material { surface: surface.clone(), ..Material::default() }],
+                ..Scene::default()
+            };
+            assert_eq!(scene.validate().len(), faults, "{:?}", scene.validate());
+        }
     }
 
     #[test]

@@ -52,7 +52,8 @@ fn cosine_to_mirror(n: DVec3, wi: DVec3, wo: DVec3) -> f64 {
 
 /// A direction about +Z with density (n + 1)/(2π) cosⁿ.
 pub(super) fn around_axis(exponent: f64, u: [f64; 2]) -> DVec3 {
-    let z = libm::pow(u[0], 1.0 / (exponent + 1.0));
+    // At 0 the density would be 0 as well, and a weight over it not a number.
+    let z = libm::pow(u[0].max(1e-12), 1.0 / (exponent + 1.0));
     let r = (1.0 - z * z).max(0.0).sqrt();
     let (sin, cos) = libm::sincos(TAU * u[1]);
     DVec3::new(r * cos, r * sin, z)

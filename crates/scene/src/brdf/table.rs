@@ -56,7 +56,7 @@ pub(super) struct GgxTables {
 }
 
 /// Points per axis of the quadrature behind one table entry.
-const QUADRATURE: usize = 24;
+const QUADRATURE: usize = 32;
 
 fn unit_square() -> impl Iterator<Item = [f64; 2]> {
     let centre = |i: usize| (i as f64 + 0.5) / QUADRATURE as f64;
@@ -70,10 +70,16 @@ pub(super) fn ggx() -> &'static GgxTables {
             let alpha = alpha.max(1e-3);
             let wi = DVec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
             let sum: f64 = unit_square()
-                .map(|u| {
-                    let h = ggx::visible_normal(wi, alpha, u);
+                .map(|[s, v]| {
+                    // The far tail of the distribution, a share of about α², is what is lost below the horizon. It
+                    // lies at the end of the unit interval, so that is where the points crowd: u = 1 − (1 − s)³.
+                    let (u, weight) = (1.0 - (1.0 - s).powi(3), 3.0 * (1.0 - s).powi(2));
+                    let h = ggx::visible_normal(wi, alpha, [u, v]);
                     let wo = 2.0 * wi.dot(h) * h - wi;
-                    if wo.z <= 0.0 { 0.0 } else { ggx::masking_ratio(wi.z, wo.z, alpha) * part(schlick(wi.dot(h))) }
+                    if wo.z <= 0.0 {
+                        return 0.0;
+                    }
+                    weight * ggx::masking_ratio(wi.z, wo.z, alpha) * part(schlick(wi.dot(h)))
                 })
                 .sum();
             sum / (QUADRATURE * QUADRATURE) as f64
