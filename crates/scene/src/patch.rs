@@ -432,6 +432,11 @@ impl PatchScene {
         &self.materials[self.triangles[self.triangle_of(patch) as usize].material as usize]
     }
 
+    /// Index of a patch's material among the authored ones.
+    pub fn material_of(&self, patch: PatchId) -> usize {
+        self.triangles[self.triangle_of(patch) as usize].material as usize
+    }
+
     /// Base colour at a point of a triangle, textures at full resolution.
     pub fn color_at(&self, triangle: u32, u: f64, v: f64) -> Rgb {
         let material = &self.materials[self.triangles[triangle as usize].material as usize];

@@ -137,6 +137,9 @@ impl FixedSums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
+    use rayon::prelude::*;
     use twinray_scene::sample::stream::{mix, to_unit};
 
     #[test]
@@ -163,6 +166,31 @@ mod tests {
         (0..n).for_each(|i| sums.add(0, Rgb::grey(deposit), to_unit(mix(i)), units));
         let mean = sums.take(0, units).squares / (n as f64 * deposit * deposit);
         assert!((mean - 1.0).abs() < 0.11, "{mean}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
+
+        /// Any values of any magnitude up to the bound, in any order and on several threads: the same bits, and the
+        /// sum to half a unit a value.
+        #[test]
+        fn any_order_gives_the_same_bits(
+            values in prop::collection::vec((-1.0..1.0f64, any::<u64>()), 1..200), exponent in -30.0..30.0f64,
+        ) {
+            let largest = 10f64.powf(exponent);
+            let unit = Unit::new(largest, values.len() as u64);
+            let mut order: Vec<usize> = (0..values.len()).collect();
+            let sums = FixedSums::new(3);
+            values.iter().for_each(|(v, _)| sums.add(0, Rgb::grey(v * largest), unit));
+            order.sort_by_key(|&i| values[i].1);
+            order.iter().for_each(|&i| sums.add(1, Rgb::grey(values[i].0 * largest), unit));
+            order.par_iter().for_each(|&i| sums.add(2, Rgb::grey(values[i].0 * largest), unit));
+            let (a, b, c) = (sums.take(0, unit), sums.take(1, unit), sums.take(2, unit));
+            prop_assert!(a == b && b == c);
+            let exact: f64 = values.iter().map(|(v, _)| v * largest).sum();
+            let rounding = largest * values.len() as f64 * 1e-15;
+            prop_assert!((a.g - exact).abs() <= rounding, "{} against {exact}", a.g);
+        }
     }
 
     #[test]

@@ -56,6 +56,10 @@ impl Workspace {
     }
 }
 
+/// All light over its first step at which the warm start stops: a contraction of ρ shoots 1/(1 − ρ) of it, so only
+/// closed scenes of an albedo above 0.9995 come here, and without a bound one of albedo 1 would never end.
+const MOST_RETURNS: f64 = 2000.0;
+
 /// State of the default schedule.
 #[derive(Debug)]
 pub(crate) struct Waves {
@@ -328,8 +332,8 @@ impl Waves {
         let mut total = 0.0;
         let mut sky = 0.0;
         let mut quantum_power = 0.0;
-        // Bounces of a contraction die out; the bound only stops what a closed scene of albedo 1 would do for ever.
-        for step in 0..100_000u64 {
+        let mut first = 0.0;
+        for step in 0.. {
             let shares = match (step, scene.environment()) {
                 (0, Some(_)) => Shares { gather: 0.3, environment: 0.3 },
                 // The one-sided estimators find light only from where they start: start everywhere.
@@ -395,8 +399,11 @@ impl Waves {
                 *s += d;
             }
             self.tally.add_weighted(&result.tally, 1.0 / divisor);
-            // A step without light (all absorbed) ends the light.
-            if result.tally.arrived.is_black() && step > 0 {
+            if step == 0 {
+                first = power;
+            }
+            // A step without light (all absorbed) ends the light, and so does a scene that gives all of it back.
+            if (result.tally.arrived.is_black() && step > 0) || total > MOST_RETURNS * first {
                 break;
             }
         }

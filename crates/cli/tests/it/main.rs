@@ -12,3 +12,4 @@ mod real;
 mod reference;
 mod reproducible;
 mod support;
+mod white;

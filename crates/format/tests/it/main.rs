@@ -1,6 +1,6 @@
 //! What the crate promises, one module per promise: features, faults, round trips, pictures, real and bad files.
 
-mod corpus;
+mod any_scene;
 mod gltf_faults;
 mod gltf_geometry;
 mod gltf_material;

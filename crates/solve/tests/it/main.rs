@@ -1,10 +1,14 @@
 //! The solver against what is known: analytic scenes, conservation laws, and itself by other means.
 
 mod analytic;
+mod build;
 mod convergence;
 mod determinism;
 mod error_bars;
 mod estimators;
+mod invariance;
+mod laws;
+mod odd_scenes;
 mod representation;
 mod strategies;
 
