@@ -6,7 +6,9 @@
 
 use std::io;
 
-use twinray_format::{FormatError, Limits, Reading, read_scene, write_glb, write_obj};
+use twinray_format::{
+    FormatError, Limits, Reading, read_picture, read_scene, read_solution, write_glb, write_obj, write_solution,
+};
 use twinray_scene::{PatchBudget, PatchOptions, PatchScene};
 
 /// Small enough that no input takes long; what is over them is refused as with the usual ones.
@@ -56,6 +58,50 @@ pub fn texture(bytes: &[u8]) {
     assert!(!reading.scene.images.is_empty() || !reading.warnings.is_empty(), "left out without a word");
 }
 
+/// A picture to be compared: PNG or EXR.
+pub fn picture(bytes: &[u8]) {
+    if let Ok(picture) = read_picture("a.png", bytes, &limits()) {
+        assert!(picture.image.pixels.iter().flatten().all(|c| c.is_finite()), "a pixel is not finite");
+        assert!(picture.display.is_none_or(|d| d.len() == picture.image.pixels.len()));
+    }
+}
+
+/// A stored solution, as it is and with its checksums put right, without which no change would get any further.
+pub fn solution(bytes: &[u8]) {
+    for bytes in [bytes.to_vec(), with_checksums(bytes.to_vec())] {
+        let Ok(file) = read_solution("a.twin", &bytes, &limits()) else { continue };
+        let again = read_solution("a.twin", &write_solution(&file), &Limits::default());
+        assert_eq!(again.expect("what was written can be read"), file);
+    }
+}
+
+/// The container of `docs/formats.md` with the checksums that its sections and its table have.
+fn with_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
+    let number = |bytes: &[u8], at: usize, n: usize| -> Option<usize> {
+        let part = bytes.get(at..at.checked_add(n)?)?;
+        Some(part.iter().rev().fold(0, |sum, &b| sum << 8 | usize::from(b)))
+    };
+    let Some(sections) = number(&bytes, 12, 4).filter(|&n| n < 64) else { return bytes };
+    for at in (0..sections).map(|i| 16 + 32 * i) {
+        let range = number(&bytes, at + 16, 8).zip(number(&bytes, at + 24, 8));
+        let range = range.and_then(|(from, length)| Some(from..from.checked_add(length)?));
+        let Some(sum) = range.and_then(|range| bytes.get(range)).map(crc) else { continue };
+        bytes[at + 12..at + 16].copy_from_slice(&sum.to_le_bytes());
+    }
+    let end = 16 + 32 * sections;
+    if bytes.len() >= end + 8 {
+        let sum = u64::from(crc(&bytes[..end]));
+        bytes[end..end + 8].copy_from_slice(&sum.to_le_bytes());
+    }
+    bytes
+}
+
+/// CRC-32 of zlib and PNG, bit by bit.
+fn crc(bytes: &[u8]) -> u32 {
+    let bit = |c: u32, _| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 };
+    !bytes.iter().fold(!0, |crc, &b| (0..8).fold(crc ^ u32::from(b), bit))
+}
+
 /// Before and after the first zero byte.
 fn split(bytes: &[u8]) -> (&[u8], &[u8]) {
     match bytes.iter().position(|&b| b == 0) {
@@ -94,7 +140,8 @@ fn check(result: Result<Reading, FormatError>) -> Option<Reading> {
     let mut nothing = |_: &str| Err(io::ErrorKind::NotFound.into());
     let again = read_scene("a.glb", &again, &mut nothing, &Limits::default());
     let again = again.unwrap_or_else(|error| panic!("what was written cannot be read: {error}"));
-    let triangles = |r: &Reading| r.scene.instances.iter().map(|i| r.scene.meshes[i.mesh].triangles.len()).sum::<usize>();
+    let triangles =
+        |r: &Reading| r.scene.instances.iter().map(|i| r.scene.meshes[i.mesh].triangles.len()).sum::<usize>();
     assert_eq!(triangles(&again), triangles(&reading));
     write_obj(scene);
     let options = PatchOptions { budget: PatchBudget::Count(64), two_sided: false };

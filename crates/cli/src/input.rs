@@ -82,6 +82,11 @@ pub fn load(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> 
     };
     let options = PatchOptions { budget, two_sided: args.two_sided };
     let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
+    if patches.degenerate_triangles() > 0 {
+        let count = patches.degenerate_triangles();
+        warnings
+            .push(format!("{name}: {count} triangles left out, as they have no area or no finite place in the scene"));
+    }
     let mut cameras = scene.cameras;
     if let Some(camera) = wanted {
         cameras.insert(0, camera);

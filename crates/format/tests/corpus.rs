@@ -26,6 +26,13 @@ fn bad_files_are_read_or_refused_in_time_and_memory() {
         println!("skipped: ../shared/scenes/bad is not here");
         return;
     }
+    // That memory is counted at all: a megabyte is noticed.
+    let (outcome, _) = watched(|_| {
+        let bytes = std::hint::black_box(vec![1u8; 1 << 20]);
+        Err(FormatError::Unreadable { file: String::new(), expected: String::new(), detail: bytes.len().to_string() })
+    });
+    assert!(outcome.peak >= 1 << 20, "{}", outcome.peak);
+
     let mut faults = Vec::new();
     let mut record = (0, PathBuf::new(), 0);
     let mut note = |file: &Path, outcome: Outcome, extra: Option<String>| {
@@ -78,7 +85,9 @@ struct Outcome {
 }
 
 /// Runs `read`, which adds the bytes it takes in to a sum, and watches time, memory and panics.
-fn watched(read: impl FnOnce(&Cell<usize>) -> Result<Reading, FormatError>) -> (Outcome, Option<Result<Reading, FormatError>>) {
+fn watched(
+    read: impl FnOnce(&Cell<usize>) -> Result<Reading, FormatError>,
+) -> (Outcome, Option<Result<Reading, FormatError>>) {
     let input = Cell::new(0);
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
@@ -118,8 +127,7 @@ fn read_picture(path: &Path, input: &Cell<usize>) -> Result<Reading, FormatError
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let materials = format!("newmtl a\nmap_Kd t.{extension}\n");
     let scene = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n";
-    let mut resolver =
-        |name: &str| Ok(if name == "a.mtl" { materials.clone().into_bytes() } else { bytes.clone() });
+    let mut resolver = |name: &str| Ok(if name == "a.mtl" { materials.clone().into_bytes() } else { bytes.clone() });
     read_scene("a.obj", scene.as_bytes(), &mut resolver, &Limits::default())
 }
 

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use twinray_format::{write_glb, write_obj};
+use twinray_format::{write_exr, write_glb, write_obj, write_solution};
 use twinray_scene::{Rgb, builtin};
 
 use crate::real::files_below;
@@ -17,8 +17,14 @@ mod bodies;
 
 type Body = fn(&[u8]);
 
-const TARGETS: [(&str, Body); 4] =
-    [("gltf", bodies::gltf), ("glb", bodies::glb), ("obj", bodies::obj), ("texture", bodies::texture)];
+const TARGETS: [(&str, Body); 6] = [
+    ("gltf", bodies::gltf),
+    ("glb", bodies::glb),
+    ("obj", bodies::obj),
+    ("texture", bodies::texture),
+    ("picture", bodies::picture),
+    ("solution", bodies::solution),
+];
 
 fn folder(target: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds").join(target)
@@ -50,6 +56,7 @@ fn seeds() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         Ks 0.5 0.5 0.5\nNs 10\nmap_Kd -o 1 1 t.png\nnewmtl b\nKe 1 1 1\nd 0.5\n";
     // The smallest true-colour TGA: a header of 18 bytes and one texel.
     let tga = [&[1u8, 0, 0, 2][..], &[0; 8], &[1, 0, 1, 0, 24, 0], &[10, 20, 30]].concat();
+    let exr = write_exr(2, 1, &[[1.0, 2.0, 3.0], [0.5, 0.0, 1e6]], None, &[]);
     vec![
         ("gltf", "square.gltf", text.json.to_string().into_bytes()),
         ("glb", "square", embedded),
@@ -58,6 +65,9 @@ fn seeds() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         ("obj", "odd", odd.to_vec()),
         ("texture", "stripe.png", [&[0u8][..], &png(&[[200, 100, 50]; 5])].concat()),
         ("texture", "dot.tga", tga),
+        ("picture", "stripe.png", png(&[[200, 100, 50]; 5])),
+        ("picture", "dots.exr", exr),
+        ("solution", "three.twin", write_solution(&crate::twin::small())),
     ]
 }
 

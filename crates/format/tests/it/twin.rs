@@ -10,7 +10,7 @@ fn read(bytes: &[u8]) -> Result<SolutionFile, FormatError> {
     read_solution("a.twin", bytes, &Limits::default())
 }
 
-fn small() -> SolutionFile {
+pub fn small() -> SolutionFile {
     SolutionFile {
         provenance: Provenance {
             software: "twinray 0.1.0".into(),

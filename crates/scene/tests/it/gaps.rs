@@ -60,10 +60,7 @@ fn thin_walls_are_closed() {
         let front = square.map(|[x, y]| [x, y, gap as f32]);
         let back = square.map(|[x, y]| [x, y, 0.0]);
         let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]];
-        let scene = cut(
-            &scene_of([front, back].concat(), triangles, DAffine3::from_quat(rotation(&mut stream))),
-            100,
-        );
+        let scene = cut(&scene_of([front, back].concat(), triangles, DAffine3::from_quat(rotation(&mut stream))), 100);
         for patch in scene.patches() {
             for _ in 0..200 {
                 let point = scene.cell_point(patch, stream.uniform(), stream.uniform());

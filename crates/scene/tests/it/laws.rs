@@ -12,12 +12,7 @@ use twinray_scene::texture::{Encoding, lookup};
 use twinray_scene::{Camera, Projection, Rgb, TextureImage, TextureRef, Wrap};
 
 fn config() -> ProptestConfig {
-    ProptestConfig {
-        cases: 2000,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(1),
-        ..ProptestConfig::default()
-    }
+    ProptestConfig { cases: 2000, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() }
 }
 
 /// A number in [0, 1), the ends among them.
@@ -59,8 +54,10 @@ fn triangle() -> impl Strategy<Value = [DVec3; 3]> {
 
 fn brdf() -> impl Strategy<Value = Brdf> {
     let rgb = || uniform3(0.0..1.0f64).prop_map(Rgb::from_array);
-    let ggx = (rgb(), unit(), unit(), unit(), rgb(), 1.0..3.0f64)
-        .prop_map(|(base, metal, rough, specular, color, ior)| Brdf::Ggx(Ggx::new(base, metal, rough, specular, color, ior)));
+    let ggx =
+        (rgb(), unit(), unit(), unit(), rgb(), 1.0..3.0f64).prop_map(|(base, metal, rough, specular, color, ior)| {
+            Brdf::Ggx(Ggx::new(base, metal, rough, specular, color, ior))
+        });
     let phong = (rgb(), rgb(), 0.0..4.0f64, unit())
         .prop_map(|(d, s, n, share)| Brdf::Phong(Phong::new(d * share, s * (1.0 - share), 10f64.powf(n) - 1.0)));
     prop_oneof![1 => rgb().prop_map(|reflectance| Brdf::Lambertian { reflectance }), 3 => ggx, 2 => phong]

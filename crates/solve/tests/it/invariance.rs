@@ -158,9 +158,11 @@ fn lamp_and_sensor_may_be_swapped() {
         ior: 1.5,
     };
     let phong = Surface::Phong { diffuse: grey(0.2), specular: Rgb::grey(0.5), exponent: 20.0 };
-    for (name, floor, wall) in
-        [("diffuse", diffuse(), diffuse()), ("metal and coat", ggx(0.4, 1.0), ggx(0.5, 0.0)), ("Phong", phong, diffuse())]
-    {
+    for (name, floor, wall) in [
+        ("diffuse", diffuse(), diffuse()),
+        ("metal and coat", ggx(0.4, 1.0), ggx(0.5, 0.0)),
+        ("Phong", phong, diffuse()),
+    ] {
         let power = |radiance: [f64; 2], to: usize, first_seed: u64| {
             let (scene, ends) = lamp_and_sensor(floor.clone(), wall.clone(), radiance);
             let scene = cut(&scene, 500);

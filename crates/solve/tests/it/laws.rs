@@ -8,12 +8,7 @@ use twinray_solve::select::{PowerTree, Table};
 use twinray_solve::transfer::{Endpoint, transfer};
 
 fn config() -> ProptestConfig {
-    ProptestConfig {
-        cases: 2000,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(1),
-        ..ProptestConfig::default()
-    }
+    ProptestConfig { cases: 2000, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() }
 }
 
 /// A weight: none, usual, or far from usual.

@@ -1,4 +1,4 @@
-//! Perfectly white rooms: glTF's default colour is 1, with which light would never die out.
+//! Odd glTF files: perfectly white (its default colour is 1, with which light would never die out), or flattened.
 
 use serde_json::{Value, json};
 
@@ -47,4 +47,20 @@ fn white_rooms_are_toned_down_and_solved() {
     // Light lives for some thirty bounces of coated white: 1e5 rays leave a few percent of it.
     assert!(residual.abs() < 0.1, "{report}");
     assert_eq!(power("escaped"), 0.0, "the room is closed");
+}
+
+/// A node may flatten its mesh to nothing: the rest is used, and the loss is counted.
+#[test]
+fn flattened_meshes_are_left_out_with_a_word() {
+    let place = Place::new();
+    let mut room = white_room();
+    room["nodes"] = json!([{ "mesh": 0 }, { "mesh": 0, "scale": [0, 0, 1] }]);
+    room["scenes"] = json!([{ "nodes": [0, 1] }]);
+    place.write("flat.gltf", room.to_string());
+    let info = place.done(&["info", "flat.gltf", "--patches", "600", "--json"]).json();
+    assert_eq!(info["triangles"], json!(12), "{info}");
+    let said = warnings(&info);
+    for count in ["2 of 2", "10 of 10"] {
+        assert!(said.iter().any(|w| w.contains(count) && w.contains("dropped: no area")), "{said:?}");
+    }
 }
