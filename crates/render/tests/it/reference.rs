@@ -186,13 +186,14 @@ fn glossy_plates_reflect_their_albedo() {
     }
 }
 
-/// Plates with a picture of light and dark on the lamp and holes in the receiver.
+/// Plates with a coloured picture on the lamp and holes in both, where the picture shines as well.
 fn textured_plates() -> Scene {
     let mut authored = builtin::plates(0.5);
     for mesh in &mut authored.meshes {
         mesh.texcoords = Some(mesh.positions.iter().map(|p| [p[0], p[2]]).collect());
     }
-    let texel = |x: u32, y: u32| if (x / 2 + y / 2).is_multiple_of(2) { [255, 200, 40, 255] } else { [9, 30, 90, 0] };
+    let texel =
+        |x: u32, y: u32| if (x / 2 + y / 2).is_multiple_of(2) { [255, 200, 40, 255] } else { [90, 160, 255, 0] };
     authored.images.push(std::sync::Arc::new(TextureImage {
         name: "checks".into(),
         width: 8,
