@@ -23,6 +23,15 @@ fn ctrl_c_writes_the_picture_and_says_so() {
 }
 
 #[test]
+fn ctrl_c_writes_the_solution() {
+    let place = Place::new();
+    interrupt(&place, &["solve", "cornell", "-o", "kept.twin", "--patches", "2000", "--time", "600"]);
+    assert_eq!(place.files(), ["kept.twin"]);
+    let kept = read_solution("kept.twin", &place.read("kept.twin"), &Limits::default()).unwrap();
+    assert!(kept.provenance.rays >= kept.light.len() as u64);
+}
+
+#[test]
 fn ctrl_c_writes_the_reference() {
     let place = Place::new();
     interrupt(&place, &["reference", "cornell", "-o", "kept.twin", "--patches", "2000", "--error", "0.0001%"]);

@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod built_in;
+mod compare;
 mod completion;
 mod faults;
 mod interrupt;
@@ -12,4 +13,5 @@ mod pictures;
 mod real;
 mod reference;
 mod reproducible;
+mod solve;
 mod support;
