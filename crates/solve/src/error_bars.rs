@@ -21,16 +21,23 @@ pub(crate) struct Evidence {
     pub hits: u32,
 }
 
-/// What is known of a solution's noise, as functions of a patch.
-pub(crate) struct Sample<I, E, D> {
+/// What is known of one patch's noise.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PatchNoise {
+    /// 𝓛(E), W·m⁻².
+    pub irradiance: f64,
+    /// Of all rays.
+    pub evidence: Evidence,
+    /// Half the difference of 𝓛(E) between two replicas, W·m⁻²; `None` where there are none and rays are independent.
+    pub half_difference: Option<f64>,
+}
+
+/// The noise of a solution, as a function of a patch.
+pub(crate) struct Noise<F> {
     /// Rays, or the weight of all of them.
     pub rays: f64,
-    /// 𝓛(E), W·m⁻².
-    pub irradiance: I,
-    /// Of all rays.
-    pub evidence: E,
-    /// Half the difference of 𝓛(E) between two replicas, W·m⁻²; `None` where there are none and rays are independent.
-    pub half_difference: Option<D>,
+    /// Asked several times for every patch.
+    pub of: F,
 }
 
 /// Patches that the ratio 1 counts for, beside those of the scene: a dozen patches have no ratio of their own.
@@ -41,18 +48,16 @@ const SCENE_PATCHES: f64 = 8.0;
 /// Octaves of numbers of hits.
 const OCTAVES: usize = 32;
 
-impl<I, E, D> Sample<I, E, D>
-where
-    I: Fn(PatchId) -> f64,
-    E: Fn(PatchId) -> Evidence,
-    D: Fn(PatchId) -> f64,
-{
+impl<F: Fn(PatchId) -> PatchNoise> Noise<F> {
     /// Per patch: standard error of 𝓛(E), W·m⁻²; infinite where nothing arrived.
     pub fn standard_errors(&self, scene: &PatchScene) -> Vec<f32> {
         let octaves = self.octaves(scene);
-        let bar = |p: PatchId| match (self.evidence)(p).hits {
-            0 => f32::INFINITY,
-            hits => (octaves[octave(hits)].mean() * self.independent(scene, p)).sqrt() as f32,
+        let bar = |p: PatchId| {
+            let noise = (self.of)(p);
+            match noise.evidence.hits {
+                0 => f32::INFINITY,
+                hits => (octaves[octave(hits)].mean() * self.independent(scene, p, &noise)).sqrt() as f32,
+            }
         };
         scene.patches().map(bar).collect()
     }
@@ -62,12 +67,11 @@ where
     fn octaves(&self, scene: &PatchScene) -> [Ratio; OCTAVES] {
         let mut octaves = [Ratio::default(); OCTAVES];
         let mut whole = Ratio { sum: PRIOR_PATCHES, patches: PRIOR_PATCHES };
-        if let Some(half_difference) = &self.half_difference {
-            for p in scene.patches() {
-                let (hits, variance) = ((self.evidence)(p).hits, self.independent(scene, p));
-                if hits > 0 && variance > 0.0 {
-                    octaves[octave(hits)].add(half_difference(p).powi(2) / variance, 1.0);
-                }
+        for p in scene.patches() {
+            let noise = (self.of)(p);
+            let (hits, variance) = (noise.evidence.hits, self.independent(scene, p, &noise));
+            if let Some(half_difference) = noise.half_difference.filter(|_| hits > 0 && variance > 0.0) {
+                octaves[octave(hits)].add(half_difference.powi(2) / variance, 1.0);
             }
         }
         octaves.iter().for_each(|o| whole.add(o.sum, o.patches));
@@ -76,32 +80,32 @@ where
     }
 
     /// Var(E) of a mean over independent rays, (Σd² − (Σd)²/N)/(N A)², W²·m⁻⁴.
-    fn independent(&self, scene: &PatchScene, patch: PatchId) -> f64 {
+    fn independent(&self, scene: &PatchScene, patch: PatchId, noise: &PatchNoise) -> f64 {
         let per_area = 1.0 / (self.rays * scene.area(patch));
-        let mean_square = (self.irradiance)(patch).powi(2) / self.rays;
-        ((self.evidence)(patch).squares * per_area * per_area - mean_square).max(0.0)
+        let mean_square = noise.irradiance.powi(2) / self.rays;
+        (noise.evidence.squares * per_area * per_area - mean_square).max(0.0)
     }
 
     /// √(ΣA Var(E) / ΣA E²) of luminance, emitters left out (unless no other patch is lit). The squares of differences
     /// estimate the mean square error without bias, whatever is known of single patches.
     pub fn relative_error(&self, scene: &PatchScene) -> f64 {
-        let variance = |p: PatchId| match &self.half_difference {
-            Some(half_difference) => half_difference(p).powi(2),
-            None => self.independent(scene, p),
+        let variance = |p: PatchId, noise: &PatchNoise| match noise.half_difference {
+            Some(half_difference) => half_difference.powi(2),
+            None => self.independent(scene, p, noise),
         };
         let sums = |which: &dyn Fn(PatchId) -> bool| {
-            scene.patches().filter(|&p| which(p)).fold([0.0; 2], |[noise, energy], p| {
-                let area = scene.area(p);
-                [noise + area * variance(p), energy + area * (self.irradiance)(p).powi(2)]
+            scene.patches().filter(|&p| which(p)).fold([0.0; 2], |[squares, energy], p| {
+                let (area, noise) = (scene.area(p), (self.of)(p));
+                [squares + area * variance(p, &noise), energy + area * noise.irradiance.powi(2)]
             })
         };
         let mut sum = sums(&|p| scene.emission(p).is_black());
         if sum[1] <= 0.0 {
             sum = sums(&|_| true);
         }
-        let [noise, energy] = sum;
+        let [squares, energy] = sum;
         // Noise makes ΣA E² too large by what it adds itself.
-        if energy > 0.0 { (noise / (energy - noise).max(0.1 * energy)).sqrt() } else { 0.0 }
+        if energy > 0.0 { (squares / (energy - squares).max(0.1 * energy)).sqrt() } else { 0.0 }
     }
 }
 

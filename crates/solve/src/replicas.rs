@@ -7,7 +7,7 @@
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene};
 
-use crate::error_bars::{Evidence, Sample};
+use crate::error_bars::{Evidence, Noise, PatchNoise};
 use crate::glossy::GlossyPatches;
 use crate::params::{Params, Representation};
 use crate::solution::{GlossySolution, Solution};
@@ -44,28 +44,21 @@ impl Replicas {
     }
 
     pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
-        self.sample(scene).relative_error(scene)
+        self.noise(scene).relative_error(scene)
     }
 
-    fn sample<'a>(
-        &'a self,
-        scene: &'a PatchScene,
-    ) -> Sample<
-        impl Fn(PatchId) -> f64 + use<'a>,
-        impl Fn(PatchId) -> Evidence + use<'a>,
-        impl Fn(PatchId) -> f64 + use<'a>,
-    > {
+    fn noise<'a>(&'a self, scene: &'a PatchScene) -> Noise<impl Fn(PatchId) -> PatchNoise + use<'a>> {
         let [a, b] = &self.runs;
-        let luminance = move |run: &Waves, p: PatchId| run.irradiance(scene, p).luminance();
-        Sample {
-            rays: a.weight() + b.weight(),
-            irradiance: move |p| 0.5 * (luminance(a, p) + luminance(b, p)),
-            evidence: move |p| {
-                let (a, b) = (a.evidence(p), b.evidence(p));
-                Evidence { squares: a.squares + b.squares, hits: a.hits.saturating_add(b.hits) }
-            },
-            half_difference: Some(move |p| 0.5 * (luminance(a, p) - luminance(b, p))),
-        }
+        let of = move |p| {
+            let [first, second] = [a, b].map(|run| run.irradiance(scene, p).luminance());
+            let (x, y) = (a.evidence(p), b.evidence(p));
+            PatchNoise {
+                irradiance: 0.5 * (first + second),
+                evidence: Evidence { squares: x.squares + y.squares, hits: x.hits.saturating_add(y.hits) },
+                half_difference: Some(0.5 * (first - second)),
+            }
+        };
+        Noise { rays: a.weight() + b.weight(), of }
     }
 
     pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
@@ -84,16 +77,16 @@ impl Replicas {
         let glossy_light = glossy_light.collect();
         let mut tally = Tally::default();
         self.runs.iter().for_each(|run| tally.add_weighted(run.tally(), 1.0));
-        let sample = self.sample(scene);
+        let noise = self.noise(scene);
         Solution {
             rays: self.rays(),
             irradiance: scene.patches().map(|p| irradiance(p).to_f32()).collect(),
-            standard_error: sample.standard_errors(scene),
-            hits: scene.patches().map(|p| (sample.evidence)(p).hits).collect(),
+            standard_error: noise.standard_errors(scene),
+            hits: scene.patches().map(|p| (noise.of)(p).evidence.hits).collect(),
             glossy: glossy.clone(),
             glossy_light,
-            balance: balance(&tally, scene.emitted_power(), sample.rays),
-            relative_error: sample.relative_error(scene),
+            balance: balance(&tally, scene.emitted_power(), noise.rays),
+            relative_error: noise.relative_error(scene),
             tally,
             splits_direct_light: params.representation != Representation::Main,
         }

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use crate::error_bars::{Evidence, Sample};
+use crate::error_bars::{Evidence, Noise, PatchNoise};
 use crate::glossy::GlossyPatches;
 use crate::params::{Params, Representation};
 use crate::patch_radiance::{Directional, Outgoing, stand_in};
@@ -275,7 +275,7 @@ impl Sequential {
     }
 
     pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
-        self.sample().relative_error(scene)
+        self.noise().relative_error(scene)
     }
 
     fn irradiance(&self, patch: PatchId) -> Rgb {
@@ -284,13 +284,13 @@ impl Sequential {
 
     /// The paper's rays are independent, so their squares need no calibration; what noise adds by being reflected is
     /// small beside the noise of a patch's own rays.
-    fn sample(&self) -> Sample<impl Fn(PatchId) -> f64, impl Fn(PatchId) -> Evidence, fn(PatchId) -> f64> {
-        Sample {
-            rays: self.n.max(1) as f64,
-            irradiance: |p| self.irradiance(p).luminance(),
-            evidence: |p: PatchId| self.evidence[p.index()],
+    fn noise(&self) -> Noise<impl Fn(PatchId) -> PatchNoise> {
+        let of = |p: PatchId| PatchNoise {
+            irradiance: self.irradiance(p).luminance(),
+            evidence: self.evidence[p.index()],
             half_difference: None,
-        }
+        };
+        Noise { rays: self.n.max(1) as f64, of }
     }
 
     pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
@@ -320,7 +320,7 @@ impl Sequential {
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&self.tally, self.emitted, n),
-            standard_error: self.sample().standard_errors(scene),
+            standard_error: self.noise().standard_errors(scene),
             hits: self.evidence.iter().map(|e| e.hits).collect(),
             relative_error: self.relative_error(scene),
             tally: self.tally,
