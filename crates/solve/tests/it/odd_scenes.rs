@@ -60,8 +60,9 @@ fn none_arrives(scene: &PatchScene, solution: &Solution) {
     let b = solution.balance();
     assert_eq!((b.absorbed, solution.invalid_deposits()), (0.0, 0));
     assert!((b.emitted - scene.emitted_power().luminance()).abs() < 1e-6 * b.emitted, "{b:?}");
-    // Of the warm start's rays and the waves' all leave; how many have started is known to their rounding.
-    assert!(((b.escaped + b.lost) / b.emitted - 1.0).abs() < 1e-5, "{b:?}");
+    // A tenth of the rays starts evenly, dark patches among them. Choices are stratified, so in each of a dozen waves
+    // the lamp's share of rays is right to about one ray: a dozen of at least 1e4, 2e5 in all.
+    assert!(((b.escaped + b.lost) / b.emitted - 1.0).abs() < 1e-4, "{b:?}");
 }
 
 /// A lamp and nothing else; one triangle; and two in one plane that face the same way, wherever they are.
