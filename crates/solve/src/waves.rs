@@ -4,7 +4,8 @@
 //! transport decays as n^−(1−λ), and a bright room stays dark. Here every wave of B rays starts from a state that
 //! forgets: wave weights v = (n + B/2)^q, while the output keeps every deposit with equal weight (Polyak and
 //! Ruppert). The warm start solves the scene coarsely, but without bias, so the output is unbiased at any n
-//! (in diffuse scenes; glossy light starts out diffuse and that is forgotten as 1/n).
+//! (in diffuse scenes; glossy light starts out diffuse, so there the output begins after the warm start, and the state
+//! that rays start from forgets).
 //!
 //! A solve has two of these (`replicas`), so sizes here are for half of its rays.
 
@@ -175,6 +176,9 @@ impl Waves {
     /// One wave.
     pub(crate) fn advance(&mut self, scene: &PatchScene, glossy: &GlossyPatches, workspace: &mut Workspace) {
         let size = self.wave_size(scene.len());
+        if self.wave == 0 && !self.glossy.is_empty() {
+            self.forget_output();
+        }
         let Workspace { frozen, sums } = workspace;
         // Under a sky most power is on roofs that send it back: more rays start where they are needed instead.
         let gather = match scene.environment() {
@@ -309,11 +313,21 @@ impl Waves {
     }
 
     fn clear(&mut self) {
+        self.forget_output();
         self.source.fill([0.0; 3]);
+        self.glossy.fill(GlossyState::default());
+    }
+
+    /// Begins the output anew. In a glossy scene the warm start takes lobes for diffuse: that is good enough to start
+    /// from, but kept in the output it would be a bias that fades as 1/n only.
+    fn forget_output(&mut self) {
         self.output.fill([0.0; 3]);
         self.evidence.fill(Evidence::default());
-        self.glossy.fill(GlossyState::default());
         self.tally = Tally::default();
+        self.output_weight = 0.0;
+        for state in &mut self.glossy {
+            (state.reflected, state.observed) = Default::default();
+        }
     }
 
     /// Adds one estimate of all light to the sums (weights 1). Returns the power that was shot in total, and what
