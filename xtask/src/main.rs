@@ -1,4 +1,4 @@
-//! Chores: `cargo xtask ci` and its parts. No tool has to be installed beside Rust itself.
+//! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`. No tool has to be installed beside Rust itself.
 //!
 //! One line a step; the first step that fails ends the run and is named. `structure` holds the checks that need no
 //! compiler, which are tests of this crate as well.
@@ -21,12 +21,17 @@ const STEPS: &[Step] = &[
     ("deps", "which crate may depend on which; links and names in the documents", deps),
 ];
 
+/// Not a part of `ci`: it takes minutes, and its comparisons are tests of `crates/validate` already.
+const VALIDATE: Step = ("validate", "writes docs/validation.md and its plots anew", validate);
+
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1).unwrap_or_default();
     let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
+    let steps = if wish == VALIDATE.0 { vec![&VALIDATE] } else { steps };
     if steps.is_empty() {
         eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");
         STEPS.iter().for_each(|(name, what, _)| eprintln!("  {name:10} {what}"));
+        eprintln!("\n  {:10} {}", VALIDATE.0, VALIDATE.1);
         return ExitCode::from(2);
     }
     for (name, _, run) in steps {
@@ -72,6 +77,10 @@ fn examples() -> Result<(), String> {
         run(&mut command)?;
     }
     Ok(())
+}
+
+fn validate() -> Result<(), String> {
+    run(cargo().args(["run", "--quiet", "--release", "--package", "twinray-validate"]))
 }
 
 fn deps() -> Result<(), String> {

@@ -16,6 +16,7 @@ const TABLE: &[(&str, &[&str])] = &[
     ("twinray-format", &["twinray-scene", "twinray-solve", "twinray-render"]),
     ("twinray", &["twinray-rays", "twinray-scene", "twinray-solve", "twinray-render", "twinray-format"]),
     ("twinray-cli", &["twinray"]),
+    ("twinray-validate", &["twinray"]),
     ("twinray-testkit", &[]),
     ("xtask", &[]),
 ];
@@ -39,7 +40,8 @@ const OUTSIDE: [&str; 11] = [
 ];
 
 /// The documents whose links and names are checked.
-const DOCUMENTS: [&str; 5] = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/paper.md", "docs/formats.md"];
+const DOCUMENTS: [&str; 6] =
+    ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/paper.md", "docs/formats.md", "docs/validation.md"];
 
 /// The root of the workspace.
 pub fn root() -> PathBuf {

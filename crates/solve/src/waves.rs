@@ -3,9 +3,10 @@
 //! The 1/n average of the paper forgets the light that it has not yet seen too slowly: an eigenmode λ of the
 //! transport decays as n^−(1−λ), and a bright room stays dark. Here every wave of B rays starts from a state that
 //! forgets: wave weights v = (n + B/2)^q, while the output keeps every deposit with equal weight (Polyak and
-//! Ruppert). The warm start solves the scene coarsely, but without bias, so the output is unbiased at any n
-//! (in diffuse scenes; glossy light starts out diffuse, so there the output begins after the warm start, and the state
-//! that rays start from forgets).
+//! Ruppert). The warm start solves the scene coarsely, but without bias, so the output has hardly any bias at any n (in
+//! diffuse scenes; glossy light starts out diffuse, so there the output begins after the warm start, and the state that
+//! rays start from forgets). What there is of it comes from one low-discrepancy sequence for all waves, 1e-4 in bright
+//! rooms: `docs/paper.md`.
 //!
 //! A solve has two of these (`replicas`), so sizes here are for half of its rays.
 

@@ -20,7 +20,7 @@ const ALL: [Estimator; 4] = [Estimator::Forward, Estimator::Backward, Estimator:
 
 /// Mean deposits per patch group over batches of rays, for each estimator: `[estimator][group][batch]`.
 #[allow(clippy::needless_range_loop)] // the batch is the innermost index of what is filled
-fn transport(
+pub(super) fn transport(
     scene: &PatchScene,
     radiance: &[Rgb],
     groups: &[usize],

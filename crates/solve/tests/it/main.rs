@@ -11,6 +11,7 @@ mod laws;
 mod odd_scenes;
 mod representation;
 mod strategies;
+mod variance;
 
 use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Rgb, Scene, Surface, Texel, builtin};
 use twinray_solve::{Params, Solution, Solver};
