@@ -27,6 +27,12 @@ impl Effort {
         rays / self.divide
     }
 
+    /// All values of a parameter in the document; in tests every third, beginning with the second.
+    pub fn thin<T: Copy>(self, all: &[T]) -> Vec<T> {
+        let (first, step) = if self == Self::DOCUMENT { (0, 1) } else { (1, 3) };
+        all.iter().copied().skip(first).step_by(step).collect()
+    }
+
     /// A resolution that is `resolution` in the document.
     pub fn resolution(self, resolution: f64) -> f64 {
         resolution * (self.divide as f64).sqrt()

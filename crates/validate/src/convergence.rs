@@ -165,7 +165,7 @@ impl Curves {
 
 /// Share of the reflected power that is missing in a furnace, by albedo.
 pub fn loss(effort: Effort) -> (Case, Figure) {
-    let albedos = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99];
+    let albedos = effort.thin(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99]);
     let rays = effort.rays(1_000_000);
     let missing = |albedo: f64| {
         let options = PatchOptions { budget: PatchBudget::Count(500), two_sided: false };
@@ -185,7 +185,7 @@ pub fn loss(effort: Effort) -> (Case, Figure) {
     };
     let measured: Vec<(f64, f64, f64)> = albedos.par_iter().map(|&a| missing(a)).collect();
     let mut rows = Vec::new();
-    for (albedo, (paper, law, worst)) in albedos.into_iter().zip(&measured) {
+    for (albedo, (paper, law, worst)) in albedos.iter().copied().zip(&measured) {
         rows.push(Row::fixed(format!("ρ = {albedo}: paper"), *law, *paper, 1e-8));
         // Noise of the warm start and the known deviation, which both grow with the number of bounces.
         let bound = 1e-4 / (1.0 - albedo) * (effort.divide as f64).sqrt();
@@ -202,7 +202,7 @@ pub fn loss(effort: Effort) -> (Case, Figure) {
         rows,
     };
     let points =
-        |part: fn(&(f64, f64, f64)) -> f64| albedos.into_iter().zip(measured.iter().map(part)).collect::<Vec<_>>();
+        |part: fn(&(f64, f64, f64)) -> f64| albedos.iter().copied().zip(measured.iter().map(part)).collect::<Vec<_>>();
     let fine: Vec<(f64, f64)> = (5..=99).map(|k| f64::from(k) / 100.0).map(|a| (a, lost_by_law(a, rays))).collect();
     let series = vec![
         Series { name: "theory for the paper's average".into(), style: Style::Theory, look: 5, points: fine },

@@ -12,7 +12,7 @@ const ALBEDOS: [(f64, f64); 5] = [(0.0, 1e-3), (0.5, 1e-3), (0.8, 1e-3), (0.95, 
 /// Mean irradiance and its scatter over patches.
 pub fn furnace(effort: Effort) -> Case {
     let mut rows = Vec::new();
-    for (albedo, resolution) in ALBEDOS {
+    for (albedo, resolution) in effort.thin(&ALBEDOS) {
         let options = PatchOptions { budget: PatchBudget::Count(2000), two_sided: false };
         let scene = PatchScene::new(&builtin::furnace(albedo, 1.0), options).expect("a built-in scene");
         let params = Params::default_preset(100);

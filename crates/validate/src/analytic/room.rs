@@ -9,7 +9,7 @@ use crate::rig::{Group, Rectangle, Rig, sequence_bias};
 pub fn room(effort: Effort) -> Case {
     let (flux, side) = (10_000.0, 4.0);
     let mut rows = Vec::new();
-    for albedo in [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95] {
+    for albedo in effort.thin(&[0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95]) {
         let mut rig = Rig::default();
         let (wall, lamp) = (rig.material(albedo, 0.0), rig.material(albedo, flux));
         let groups = closed_room(&mut rig, [side; 3], wall, lamp);

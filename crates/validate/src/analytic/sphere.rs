@@ -14,7 +14,7 @@ use crate::shapes::{Body, icosphere, solid_angle, truncated_sphere};
 pub fn integrating(effort: Effort) -> Case {
     let body = icosphere(1.0, 4).flipped();
     let mut rows = Vec::new();
-    for albedo in [0.5, 0.8, 0.9, 0.95] {
+    for albedo in effort.thin(&[0.5, 0.8, 0.9, 0.95]) {
         let mut rig = Rig::default();
         let (wall, lamp) = (rig.material(albedo, 0.0), rig.material(albedo, 1.0));
         let bands: Vec<Group> = (0..4).map(|_| rig.group()).collect();

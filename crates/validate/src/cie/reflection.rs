@@ -119,7 +119,7 @@ pub fn obstructed(effort: Effort) -> Case {
 pub fn internal(effort: Effort) -> Case {
     let flux = 10_000.0;
     let mut rows = Vec::new();
-    for albedo in [0.1, 0.3, 0.5, 0.7, 0.9, 0.95] {
+    for albedo in effort.thin(&[0.1, 0.3, 0.5, 0.7, 0.9, 0.95]) {
         let mut rig = Rig::default();
         let (wall, lamp) = (rig.material(albedo, 0.0), rig.material(albedo, flux));
         let groups = closed_room(&mut rig, [6.0, 3.0, 4.5], wall, lamp);

@@ -1,7 +1,7 @@
 //! The document's comparisons with fewer rays: what `docs/validation.md` claims, the tests ask.
 //!
-//! Sixteen times fewer rays, four times coarser resolutions; the rule is the document's. With about 170 rows and a
-//! false-alarm rate of 1e-5 a row, a right program fails by chance once in 600 choices of seeds; seeds are fixed.
+//! Sixteen times fewer rays, four times coarser resolutions, fewer albedos; the rule is the document's. With some 120 rows and a
+//! false-alarm rate of 1e-5 a row, a right program fails by chance once in 800 choices of seeds; seeds are fixed.
 
 use twinray_validate::case::{Case, Effort};
 use twinray_validate::{analytic, cie, convergence};
