@@ -285,7 +285,9 @@ impl Waves {
     /// ends it where less than one ray's worth is left. Counts follow from U alone and deposits are divided by the
     /// count that was planned with certainty, so the sum is unbiased.
     fn warm_start(&mut self, scene: &PatchScene, glossy: &GlossyPatches, workspace: &mut Workspace) {
-        let planned = ((0.5 * self.params.warm_start * scene.len() as f64) as u64).max(SMALLEST_WARM_START);
+        // A glossy scene's output does not remember the start, so there it is the shorter the better forgotten.
+        let smallest = if self.glossy.is_empty() { SMALLEST_WARM_START } else { SMALLEST_WAVE };
+        let planned = ((0.5 * self.params.warm_start * scene.len() as f64) as u64).max(smallest);
         let pilot_rays = (planned / 32) as f64;
         // A pilot measures how much light there will be to shoot, and how much of the sky comes in; its result is
         // thrown away, so that the main run's counts do not depend on the main run's numbers.
