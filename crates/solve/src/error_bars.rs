@@ -2,13 +2,14 @@
 //!
 //! Two things make a patch noisy: the rays that bring its light, and the light they carry, which other rays brought
 //! before. The first is seen on the patch itself: Σ 𝓛(d)² over its deposits d is the variance that independent rays
-//! leave (Paper: §1, variance of the estimators). But rays are stratified, which makes that too large, and noise is
-//! reflected, which makes it too small. Both are in the difference of two replicas (`replicas`), whose mean square
-//! over patches is the mean square error of their mean. One difference is one draw of a random variable, so no patch
+//! leave. But rays are stratified, which makes that too large, and noise is reflected, which makes it too small. Both
+//! are in the difference of two replicas (`replicas`), whose mean square over patches is the mean square error of
+//! their mean. One difference is one draw of a random variable, so no patch
 //! can be judged by its own; but among patches of about as many hits (many are stratified better than few), the
 //! ratio of mean squares scales the bars.
 //!
-//! Not here: bias. Both presets are free of it but for what `docs/paper.md` says of the paper's 1/n average.
+//! Not here: bias. What there is of it stands in `docs/paper.md`: the loss of the paper's 1/n average, and a far smaller
+//! one of the default preset's low-discrepancy numbers.
 
 use twinray_scene::{PatchId, PatchScene};
 
