@@ -22,6 +22,18 @@ pub(crate) struct Evidence {
     pub hits: u32,
 }
 
+/// The evidence of two replicas on one patch. Entered once a wave, so that single precision does not stall.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub(crate) struct PackedEvidence {
+    /// Σ 𝓛(deposit)² of both, W².
+    pub squares: f32,
+    /// Σ 𝓛(deposit) of the first minus that of the second, W.
+    pub difference: f32,
+    /// Number of deposits of both.
+    pub hits: u32,
+}
+
 /// What is known of one patch's noise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PatchNoise {

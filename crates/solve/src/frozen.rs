@@ -1,203 +1,381 @@
 //! The state that a wave of rays starts from: every patch's outgoing light, frozen, and the choice among patches.
 //!
-//! Strategies (shares sum to 1): by power, evenly over area and patches, from the environment. All are one density
-//! λ_i(ω) = power_share · q_i(ω)/P + gather_share · w_i/(π A_i) at patches, w_i half A_i/A_total and half 1/K, and
-//! λ_env(ω) = environment_share · pdf_line(ω) at the sky, so one formula of the balance heuristic covers them.
+//! The strategies are one density (shares sum to 1): at patches
+//! λ_i(ω) = power · q_i(ω)/P + lamps · 𝓛(E_i)/P_E + area/(π A_total) + patches · w_i/(π A_i),
+//! and λ_env(ω) = environment · pdf_line(ω) at the sky, so one formula of the balance heuristic covers them. The choice
+//! is one sweep along the patches: a sum per four patches is kept, and rays come in order of their first number.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 use crate::glossy::GlossyPatches;
+use crate::params::Representation;
 use crate::patch_radiance::{Directional, Outgoing, stand_in};
-use crate::select::Table;
+use crate::source::{PackedRepresentative, Source};
+use crate::strategies::{STRATEGIES, Shares};
 use crate::transfer::Endpoint;
 
-/// Wishes for the strategies; what has no power gives its share to the gather.
-#[derive(Clone, Copy, Debug)]
-pub struct Shares {
-    /// Evenly, half by area and half by number of patches.
-    pub gather: f64,
-    /// From the environment; 0 where it does not shine in this wave.
-    pub environment: f64,
+/// Patches of one entry of the table.
+const BLOCK: usize = 4;
+/// Patches of one parallel task: a multiple of [`BLOCK`].
+const TASK: usize = 1 << 14;
+
+/// Bytes of the table per patch.
+pub(crate) const BYTES_PER_PATCH: usize = size_of::<f64>() / BLOCK;
+/// Bytes of a glossy patch beside that.
+pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = size_of::<StandIn>();
+
+/// What is derived from the sources for a wave; memory that waves take turns to use.
+#[derive(Debug, Default)]
+pub(crate) struct FrozenTables {
+    /// Running sum of the patches' weights, after every [`BLOCK`].
+    cumulative: Vec<f64>,
+    /// Per glossy patch.
+    stand_ins: Vec<StandIn>,
 }
 
-/// What a caller says of one patch.
-#[derive(Clone, Copy, Debug)]
-pub struct Light {
-    /// Emission, W·sr⁻¹·m⁻².
-    pub emitted: Rgb,
-    /// Main part of the reflected radiance, W·sr⁻¹·m⁻².
-    pub main_part: Rgb,
-    /// Directional part of a glossy patch.
-    pub directional: Option<Directional>,
+/// The non-negative stand-in of a glossy patch: coefficient of its cosine part, power of its lobe part.
+#[derive(Clone, Copy, Debug, Default)]
+struct StandIn {
+    cosine: f32,
+    lobe: f32,
 }
 
 /// A frozen state.
-#[derive(Debug, Default)]
-pub struct Frozen {
-    /// Per patch: E + main part.
-    constant: Vec<[f32; 3]>,
-    /// Per glossy patch.
-    directional: Vec<GlossyLight>,
-    table: Table,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frozen<'a> {
+    start: Start<'a>,
+    stand_ins: &'a [StandIn],
+    cumulative: &'a [f64],
     /// 𝓛 of the power of all patches' stand-ins, W.
     power: f64,
-    /// power_share / P.
-    per_power: f64,
-    /// gather_share / (2π A_total), and gather_share / (2π K): the latter over the patch's own area.
-    gather: [f64; 2],
-    environment_share: f64,
-    /// False in the later steps of the warm start, whose light is reflected only.
-    emits: bool,
+    coefficients: Coefficients,
 }
 
-/// Bytes of a frozen glossy patch.
-pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = size_of::<GlossyLight>();
-
+/// The shares over what normalises them.
 #[derive(Clone, Copy, Debug)]
-struct GlossyLight {
-    directional: Option<Directional>,
-    cosine_density: f64,
-    lobe_density: f64,
+pub(crate) struct Coefficients {
+    per_power: f64,
+    per_lamp_power: f64,
+    area: f64,
+    patches: f64,
+    environment: f64,
 }
 
-impl Frozen {
-    /// Refills the state. `light` is asked once per patch; `total_area` is that of all patches.
-    pub fn fill(
-        &mut self,
-        scene: &PatchScene,
-        glossy: &GlossyPatches,
-        total_area: f64,
-        shares: Shares,
-        light: impl Fn(PatchId) -> Light,
-    ) {
-        self.constant.clear();
-        self.directional.clear();
-        self.emits = false;
-        // First pass: radiance and the stand-in's power of every patch; glossy ones keep (cosine, lobe) for now.
-        let mut power = 0.0;
-        for patch in scene.patches() {
-            let l = light(patch);
-            self.emits |= !l.emitted.is_black();
-            // Stored in single precision: the stored value is the state, so nothing is inconsistent.
-            let constant = (l.emitted + l.main_part).to_f32();
-            self.constant.push(constant);
-            let mut radiosity = PI * Rgb::from_f32(constant).luminance();
-            if glossy.number_of(patch).is_some() {
-                let n = scene.normal(patch);
-                let parts = l.directional.map(|d| {
-                    let cosine = n.dot(d.wi);
-                    let lobe = d.brdf.lobe_albedo(cosine);
-                    (d.irradiance, lobe, d.brdf.albedo(cosine) - lobe)
-                });
-                let (cosine, lobe) = stand_in(l.emitted, l.main_part, parts);
-                radiosity = PI * cosine + lobe;
-                self.directional.push(GlossyLight {
-                    directional: l.directional,
-                    cosine_density: cosine,
-                    lobe_density: lobe,
-                });
-            }
-            power += radiosity * scene.area(patch);
-        }
+/// What a wave is frozen from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Start<'a> {
+    pub scene: &'a PatchScene,
+    pub glossy: &'a GlossyPatches,
+    pub sources: &'a [Source],
+    /// Empty if directional parts are not to be shot.
+    pub representatives: &'a [PackedRepresentative],
+    pub representation: Representation,
+    /// Whether the sources hold the patches' emission.
+    pub emits: bool,
+    /// 𝓛 of the power that patches emit, W.
+    pub lamp_power: f64,
+    pub total_area: f64,
+}
 
-        self.power = power;
-        self.environment_share = if scene.environment().is_some() { shares.environment } else { 0.0 };
-        let power_share = if power > 0.0 { 1.0 - self.environment_share - shares.gather } else { 0.0 };
-        let gather_share = 1.0 - self.environment_share - power_share;
-        self.per_power = if power > 0.0 { power_share / power } else { 0.0 };
-        // By area alone the tiny patches of uneven meshes would hardly ever shoot, by number alone the large ones.
-        self.gather = [total_area, scene.len() as f64].map(|x| 0.5 * gather_share / (PI * x));
-
-        // Second pass: densities.
-        for (&patch, g) in glossy.patches().iter().zip(&mut self.directional) {
-            g.cosine_density = g.cosine_density * self.per_power + self.gather[0] + self.gather[1] / scene.area(patch);
-            g.lobe_density *= self.per_power;
+impl<'a> Frozen<'a> {
+    /// Fills the tables for a wave with these shares; what has no power gives its share to the gather. O(K).
+    pub(crate) fn new(start: Start<'a>, shares: Shares, tables: &'a mut FrozenTables) -> Self {
+        let FrozenTables { cumulative, stand_ins } = tables;
+        let power = fill_stand_ins(&start, stand_ins);
+        let coefficients = Coefficients::new(&start, shares, power);
+        let mut this = Self { start, stand_ins, cumulative: &[], power, coefficients };
+        cumulative.resize(start.sources.len().div_ceil(BLOCK), 0.0);
+        cumulative.par_iter_mut().enumerate().with_min_len(TASK / BLOCK).for_each(|(block, sum)| {
+            *sum = this.block(block).map(|p| this.weight(p)).sum();
+        });
+        let mut sum = 0.0;
+        for entry in cumulative.iter_mut() {
+            sum += *entry;
+            *entry = sum;
         }
-        let mut table = std::mem::take(&mut self.table);
-        table.fill(scene.patches().map(|patch| {
-            let out = self.outgoing(scene, glossy, patch);
-            scene.area(patch) * (PI * out.cosine_density + out.lobe_density)
-        }));
-        self.table = table;
+        this.cumulative = cumulative;
+        this
     }
 
     /// Luminance of the power that all patches send out, W.
-    pub fn power(&self) -> f64 {
+    pub(crate) fn power(&self) -> f64 {
         self.power
+    }
+
+    /// Whether the sources hold the patches' emission.
+    pub(crate) fn emits(&self) -> bool {
+        self.start.emits
+    }
+
+    /// True if the patch itself emits, in this state.
+    #[inline]
+    pub(crate) fn is_lamp(&self, patch: PatchId) -> bool {
+        self.start.emits && self.start.sources[patch.index()].emits()
     }
 
     /// The largest deposit that one ray can leave: radiance over the smallest density beside it.
     ///
     /// A channel is at most 1/0.0722 of the luminance; a lobe's radiance may exceed its stand-in by the ratio of
     /// Fresnel terms, at most about 1/0.02.
-    pub fn largest_deposit(&self, scene: &PatchScene) -> f64 {
+    pub(crate) fn largest_deposit(&self) -> f64 {
         let channel = 14.0;
-        let lobes = if self.directional.is_empty() { 1.0 } else { 64.0 };
-        let by_power = if self.per_power > 0.0 { channel * lobes / self.per_power } else { 0.0 };
-        let by_sky = match scene.environment() {
-            Some(e) if self.environment_share > 0.0 => channel * e.power().luminance() / self.environment_share,
+        let lobes = if self.stand_ins.is_empty() { 1.0 } else { 64.0 };
+        let c = &self.coefficients;
+        let by_power = if c.per_power > 0.0 { channel * lobes / c.per_power } else { 0.0 };
+        let by_sky = match self.start.scene.environment() {
+            Some(e) if c.environment > 0.0 => channel * e.power().luminance() / c.environment,
             _ => 0.0,
         };
         by_power.max(by_sky)
     }
 
+    /// What a patch sends towards `wo`, and the density with which rays start there.
+    #[inline]
+    pub(crate) fn endpoint(&self, patch: PatchId, wo: DVec3) -> Endpoint {
+        if self.start.representatives.is_empty() || self.start.glossy.number_of(patch).is_none() {
+            let source = &self.start.sources[patch.index()];
+            let radiance = source.radiance();
+            return Endpoint { radiance, density: self.cosine_density(patch, source, radiance.luminance()) };
+        }
+        self.outgoing(patch).endpoint(self.start.scene.normal(patch), wo)
+    }
+
     /// Outgoing light of a patch.
     #[inline]
-    pub fn outgoing(&self, scene: &PatchScene, glossy: &GlossyPatches, patch: PatchId) -> Outgoing {
-        let constant = Rgb::from_f32(self.constant[patch.index()]);
-        match glossy.number_of(patch) {
-            None => Outgoing {
-                constant,
-                directional: None,
-                cosine_density: self.per_power * constant.luminance()
-                    + self.gather[0]
-                    + self.gather[1] / scene.area(patch),
-                lobe_density: 0.0,
-            },
-            Some(k) => {
-                let g = &self.directional[k];
-                Outgoing {
-                    constant,
-                    directional: g.directional,
-                    cosine_density: g.cosine_density,
-                    lobe_density: g.lobe_density,
-                }
-            }
+    pub(crate) fn outgoing(&self, patch: PatchId) -> Outgoing {
+        let source = &self.start.sources[patch.index()];
+        let constant = source.radiance();
+        let number = match self.start.representatives {
+            [] => None,
+            _ => self.start.glossy.number_of(patch),
+        };
+        let Some(k) = number else {
+            let cosine_density = self.cosine_density(patch, source, constant.luminance());
+            return Outgoing { constant, directional: None, cosine_density, lobe_density: 0.0 };
+        };
+        let stand_in = self.stand_ins[k];
+        Outgoing {
+            constant,
+            directional: self.start.directional(patch, k),
+            cosine_density: self.cosine_density(patch, source, f64::from(stand_in.cosine)),
+            lobe_density: self.coefficients.per_power * f64::from(stand_in.lobe),
         }
     }
 
-    /// The share of a patch's radiance that is its own emission, per channel, while it shines in this state.
+    /// The part of λ that is the same in every direction, for a stand-in radiance of luminance `cosine`.
     #[inline]
-    pub fn emitted_share(&self, scene: &PatchScene, patch: PatchId, radiance: Rgb) -> Rgb {
-        if !self.emits {
-            return Rgb::BLACK;
+    fn cosine_density(&self, patch: PatchId, source: &Source, cosine: f64) -> f64 {
+        let c = &self.coefficients;
+        let mut density = c.per_power * cosine + c.area + c.patches * source.gather();
+        if c.per_lamp_power > 0.0 && source.emits() {
+            density += c.per_lamp_power * self.start.scene.emission(patch).luminance();
         }
-        let emitted = scene.emission(patch);
-        let share = |e: f64, l: f64| if e > 0.0 && l > 0.0 { e / l } else { 0.0 };
-        Rgb::new(share(emitted.r, radiance.r), share(emitted.g, radiance.g), share(emitted.b, radiance.b))
+        density
+    }
+
+    /// λ of each strategy alone at a patch, shares included, in the order of [`Shares::to_array`]; `density` is all of
+    /// them together.
+    #[inline]
+    pub(crate) fn parts(&self, patch: PatchId, density: f64) -> [f64; STRATEGIES] {
+        let c = &self.coefficients;
+        let source = &self.start.sources[patch.index()];
+        let lamps = if c.per_lamp_power > 0.0 && source.emits() {
+            c.per_lamp_power * self.start.scene.emission(patch).luminance()
+        } else {
+            0.0
+        };
+        let patches = c.patches * source.gather();
+        [density - lamps - c.area - patches, lamps, c.area, patches, 0.0]
+    }
+
+    /// Probability with which a patch is chosen, but for the rounding of all of them.
+    #[inline]
+    fn weight(&self, patch: PatchId) -> f64 {
+        let area = self.start.scene.area(patch);
+        let source = &self.start.sources[patch.index()];
+        let (cosine, lobe) = match self.start.representatives {
+            [] => (source.radiance().luminance(), 0.0),
+            _ => match self.start.glossy.number_of(patch) {
+                Some(k) => (f64::from(self.stand_ins[k].cosine), f64::from(self.stand_ins[k].lobe)),
+                None => (source.radiance().luminance(), 0.0),
+            },
+        };
+        area * (PI * self.cosine_density(patch, source, cosine) + self.coefficients.per_power * lobe)
+    }
+
+    fn block(&self, block: usize) -> impl Iterator<Item = PatchId> + use<> {
+        let end = (BLOCK * (block + 1)).min(self.start.sources.len());
+        (BLOCK * block..end).map(|i| PatchId(i as u32))
+    }
+
+    /// Where a ray starts, for uniform `u`: a patch, or `None` for the environment. `cursor` is where the last one
+    /// was found (0 at first): rays in order of u cost O(1), rays in any order O(log K).
+    #[inline]
+    pub(crate) fn select(&self, u: f64, cursor: &mut usize) -> Option<PatchId> {
+        let environment = self.coefficients.environment;
+        if u < environment {
+            return None;
+        }
+        let total = *self.cumulative.last()?;
+        let target = ((u - environment) / (1.0 - environment)).min(1.0 - f64::EPSILON) * total;
+        *cursor = gallop(self.cumulative, target, *cursor);
+        let mut before = if *cursor == 0 { 0.0 } else { self.cumulative[*cursor - 1] };
+        // Rounding may leave the target beyond the last weight: then the last patch that has one.
+        let mut chosen = None;
+        for patch in self.block(*cursor) {
+            let weight = self.weight(patch);
+            if weight > 0.0 {
+                chosen = Some(patch);
+            }
+            before += weight;
+            if before > target && chosen.is_some() {
+                break;
+            }
+        }
+        chosen
     }
 
     /// What the environment brings to a ray that leaves the scene in `towards`; black if it does not shine now.
     #[inline]
-    pub fn sky(&self, scene: &PatchScene, towards: DVec3) -> Endpoint {
-        match scene.environment() {
-            Some(e) if self.environment_share > 0.0 => {
-                Endpoint { radiance: e.radiance(towards), density: self.environment_share * e.pdf_line(towards) }
+    pub(crate) fn sky(&self, towards: DVec3) -> Endpoint {
+        match self.start.scene.environment() {
+            Some(e) if self.coefficients.environment > 0.0 => {
+                Endpoint { radiance: e.radiance(towards), density: self.coefficients.environment * e.pdf_line(towards) }
             }
             _ => Endpoint { radiance: Rgb::BLACK, density: 0.0 },
         }
     }
+}
 
-    /// Where a ray starts, for uniform `u`: a patch, or `None` for the environment.
-    #[inline]
-    pub fn select(&self, u: f64) -> Option<PatchId> {
-        if u < self.environment_share {
-            return None;
+/// The first entry above `target`, sought from `near` with growing steps.
+#[inline]
+fn gallop(cumulative: &[f64], target: f64, near: usize) -> usize {
+    let last = cumulative.len() - 1;
+    let near = near.min(last);
+    let (mut low, mut high);
+    if cumulative[near] > target {
+        // Backwards: entries from `high` on are above the target.
+        high = near;
+        let mut step = 1;
+        loop {
+            if high < step {
+                low = 0;
+                break;
+            }
+            if cumulative[high - step] <= target {
+                low = high - step + 1;
+                break;
+            }
+            high -= step;
+            step *= 2;
         }
-        let rest = (u - self.environment_share) / (1.0 - self.environment_share);
-        Some(PatchId(self.table.select(rest.min(1.0 - f64::EPSILON)) as u32))
+    } else {
+        // Forwards: entries before `low` are not above it.
+        low = near + 1;
+        let mut step = 1;
+        loop {
+            if low + step > last {
+                high = last;
+                break;
+            }
+            if cumulative[low + step - 1] > target {
+                high = low + step - 1;
+                break;
+            }
+            low += step;
+            step *= 2;
+        }
+    }
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if cumulative[middle] > target { high = middle } else { low = middle + 1 }
+    }
+    low.min(last)
+}
+
+impl Coefficients {
+    fn new(start: &Start, shares: Shares, power: f64) -> Self {
+        let mut s = shares;
+        let mut freed = 0.0;
+        if start.scene.environment().is_none() {
+            freed += std::mem::take(&mut s.environment);
+        }
+        if !(start.emits && start.lamp_power > 0.0) {
+            freed += std::mem::take(&mut s.lamps);
+        }
+        if power > 0.0 {
+            s.power += freed;
+        } else {
+            let freed = 0.5 * (freed + std::mem::take(&mut s.power));
+            s.area += freed;
+            s.patches += freed;
+        }
+        let per = |share: f64, whole: f64| if share > 0.0 { share / whole } else { 0.0 };
+        Self {
+            per_power: per(s.power, power),
+            per_lamp_power: per(s.lamps, start.lamp_power),
+            area: s.area / (PI * start.total_area),
+            patches: s.patches,
+            environment: s.environment,
+        }
+    }
+}
+
+impl<'a> Start<'a> {
+    #[inline]
+    fn directional(&self, patch: PatchId, k: usize) -> Option<Directional> {
+        self.representatives[k].directional(self.scene, patch, self.representation)
+    }
+}
+
+/// Computes the glossy patches' stand-ins; returns the power of all patches' stand-ins.
+fn fill_stand_ins(start: &Start, stand_ins: &mut Vec<StandIn>) -> f64 {
+    stand_ins.resize(start.representatives.len(), StandIn::default());
+    let patches = start.glossy.patches();
+    stand_ins.par_iter_mut().enumerate().with_min_len(256).for_each(|(k, stand_in_of)| {
+        let patch = patches[k];
+        let emitted = if start.emits { start.scene.emission(patch) } else { Rgb::BLACK };
+        let main_part = start.sources[patch.index()].radiance() - emitted;
+        let parts = start.directional(patch, k).map(|d| {
+            let cosine = start.scene.normal(patch).dot(d.wi);
+            let lobe = d.brdf.lobe_albedo(cosine);
+            (d.irradiance, lobe, d.brdf.albedo(cosine) - lobe)
+        });
+        let (cosine, lobe) = stand_in(emitted, main_part, parts);
+        *stand_in_of = StandIn { cosine: cosine as f32, lobe: lobe as f32 };
+    });
+    let power = |i: usize, source: &Source| {
+        let patch = PatchId(i as u32);
+        let glossy = if stand_ins.is_empty() { None } else { start.glossy.number_of(patch) };
+        let radiosity = match glossy {
+            Some(k) => PI * f64::from(stand_ins[k].cosine) + f64::from(stand_ins[k].lobe),
+            None => PI * source.radiance().luminance(),
+        };
+        radiosity * start.scene.area(patch)
+    };
+    // Chunks in order: floating-point sums must not depend on the number of threads.
+    let chunk = |(c, sources): (usize, &[Source])| (TASK * c..).zip(sources).map(|(i, s)| power(i, s)).sum::<f64>();
+    let sums: Vec<f64> = start.sources.par_chunks(TASK).enumerate().map(chunk).collect();
+    sums.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn galloping_finds_what_a_scan_finds() {
+        let cumulative = [0.0, 0.5, 0.5, 1.25, 2.0, 2.0, 2.0, 7.0, 7.5, 9.0];
+        for near in 0..cumulative.len() + 2 {
+            for k in 0..90 {
+                let target = f64::from(k) * 0.1;
+                let expected = cumulative.iter().position(|&c| c > target).unwrap_or(9);
+                assert_eq!(gallop(&cumulative, target, near), expected, "{target} from {near}");
+            }
+        }
     }
 }

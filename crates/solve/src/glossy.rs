@@ -13,11 +13,18 @@ pub struct GlossyPatches {
     /// Per patch: its number among the glossy ones; empty if none is glossy.
     number: Vec<u32>,
     patches: Vec<PatchId>,
-    /// Per glossy patch: direction to the eye.
-    to_eye: Vec<Option<DVec3>>,
+    /// Per glossy patch: direction to the eye, zero if the eye is behind; empty without an observer.
+    to_eye: Vec<[f32; 3]>,
 }
 
 impl GlossyPatches {
+    /// Bytes per patch of a scene with glossy ones: their numbering.
+    pub(crate) const BYTES_PER_PATCH: usize = 4;
+    /// Bytes per glossy patch.
+    pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = 4;
+    /// Bytes that an observer adds.
+    pub(crate) const BYTES_PER_OBSERVED_PATCH: usize = 12;
+
     /// Numbers the glossy patches of a scene.
     pub fn new(scene: &PatchScene, observer: Option<&Observer>) -> Self {
         let patches: Vec<PatchId> = scene.patches().filter(|&p| scene.is_glossy(p)).collect();
@@ -28,10 +35,8 @@ impl GlossyPatches {
                 number[p.index()] = k as u32;
             }
         }
-        let to_eye = match observer {
-            Some(o) => patches.iter().map(|&p| o.direction(scene, p)).collect(),
-            None => vec![None; patches.len()],
-        };
+        let direction = |o: &Observer, p| o.direction(scene, p).unwrap_or_default().as_vec3().to_array();
+        let to_eye = observer.map_or(Vec::new(), |o| patches.iter().map(|&p| direction(o, p)).collect());
         Self { number, patches, to_eye }
     }
 
@@ -52,6 +57,13 @@ impl GlossyPatches {
     /// Direction from a glossy patch, given by its number, to the eye.
     #[inline]
     pub fn to_eye(&self, number: usize) -> Option<DVec3> {
-        self.to_eye[number]
+        let &[x, y, z] = self.to_eye.get(number)?;
+        DVec3::new(f64::from(x), f64::from(y), f64::from(z)).try_normalize()
+    }
+
+    /// True if there is an observer and something glossy for it to see.
+    #[inline]
+    pub fn is_observed(&self) -> bool {
+        !self.to_eye.is_empty()
     }
 }

@@ -5,12 +5,16 @@
 
 use twinray_scene::PatchScene;
 
+use crate::frozen;
 use crate::glossy::GlossyPatches;
 use crate::observer::Observer;
 use crate::params::{Params, Schedule, SolveError};
 use crate::replicas::Replicas;
 use crate::sequential::Sequential;
 use crate::solution::Solution;
+use crate::stage::Stage;
+use crate::wave::close;
+use crate::waves::Surroundings;
 
 /// Rays of the paper's schedule between two looks at the clock.
 const SEQUENTIAL_STEP: u64 = 1 << 17;
@@ -56,7 +60,10 @@ impl<'a> Solver<'a> {
         let state = match params.schedule {
             Schedule::Paper { .. } if sky => return Err(SolveError::PaperEnvironment),
             Schedule::Paper { batch } => State::Sequential(Box::new(Sequential::new(scene, &glossy)), batch.max(1)),
-            Schedule::Waves => State::Waves(Box::new(Replicas::new(scene, &glossy, &params))),
+            Schedule::Waves => {
+                let around = Surroundings { scene, glossy: &glossy, params: &params, lap: &|_| () };
+                State::Waves(Box::new(Replicas::new(around)))
+            }
         };
         Ok(Self { scene, params, glossy, state })
     }
@@ -71,12 +78,19 @@ impl<'a> Solver<'a> {
 
     /// A wave in each replica, or at most `limit − rays()` iterations of the paper's schedule (whole batches).
     pub fn advance(&mut self, limit: u64) {
+        self.advance_in_stages(limit, &|_| ());
+    }
+
+    /// [`Solver::advance`], told of the end of every stage of a wave on the thread that did it.
+    pub fn advance_in_stages(&mut self, limit: u64, lap: &(dyn Fn(Stage) + Sync)) {
         match &mut self.state {
             State::Sequential(s, batch) => {
                 let rays = limit.saturating_sub(s.rays()).clamp(1, SEQUENTIAL_STEP.max(*batch));
                 s.advance(self.scene, &self.glossy, &self.params, rays, *batch);
             }
-            State::Waves(w) => w.advance(self.scene, &self.glossy),
+            State::Waves(w) => {
+                w.advance(Surroundings { scene: self.scene, glossy: &self.glossy, params: &self.params, lap });
+            }
         }
     }
 
@@ -107,12 +121,23 @@ impl<'a> Solver<'a> {
     pub fn solution(&self) -> Solution {
         match &self.state {
             State::Sequential(s, _) => s.solution(self.scene, &self.glossy, &self.params),
-            State::Waves(w) => w.solution(self.scene, &self.glossy, &self.params),
+            State::Waves(w) => w.solution(Surroundings {
+                scene: self.scene,
+                glossy: &self.glossy,
+                params: &self.params,
+                lap: &|_| (),
+            }),
         }
     }
 }
 
-/// Bytes of solver state for a scene of so many patches, of which some are glossy (default schedule).
-pub fn state_bytes(patches: usize, glossy: usize) -> usize {
-    patches * crate::waves::BYTES_PER_PATCH + glossy * crate::waves::BYTES_PER_GLOSSY_PATCH
+/// Bytes that a solve of a scene of so many patches, of which some are glossy, keeps for each (default schedule), error
+/// bars and table of the choice included; beside them are the lists of the rays in flight, 37 bytes a ray of a wave.
+pub fn state_bytes(patches: usize, glossy: usize, observed: bool) -> usize {
+    let lobe = close::BYTES_PER_GLOSSY_PATCH
+        + frozen::BYTES_PER_GLOSSY_PATCH
+        + GlossyPatches::BYTES_PER_GLOSSY_PATCH
+        + if observed { close::BYTES_PER_OBSERVED_PATCH + GlossyPatches::BYTES_PER_OBSERVED_PATCH } else { 0 };
+    let number = if glossy > 0 { GlossyPatches::BYTES_PER_PATCH } else { 0 };
+    patches * (close::BYTES_PER_PATCH + frozen::BYTES_PER_PATCH + number) + glossy * lobe
 }

@@ -14,6 +14,7 @@
 //! assert!(solver.solution().balance().residual().abs() < 0.01);
 //! ```
 
+mod direction;
 mod error_bars;
 mod fixed;
 mod frozen;
@@ -29,6 +30,9 @@ pub mod select;
 mod sequential;
 mod shoot;
 mod solution;
+mod source;
+mod stage;
+mod strategies;
 mod tally;
 pub mod transfer;
 mod wave;
@@ -39,4 +43,5 @@ pub use observer::Observer;
 pub use params::{Estimator, Params, Representation, Schedule, SolveError};
 pub use patch_light::PatchLight;
 pub use solution::{PowerBalance, Solution};
+pub use stage::Stage;
 pub use tally::Tally;

@@ -4,15 +4,17 @@
 //! before it was sent on, the one remembered sample of a glossy patch. Independence costs a few percent of error,
 //! since each half is stratified alone (`docs/paper.md`); nothing else tells a stratified solve's error from within.
 
+use std::f64::consts::PI;
+
 use twinray_scene::sample::Stream;
-use twinray_scene::{PatchId, PatchScene};
+use twinray_scene::{PatchId, PatchScene, Rgb};
 
 use crate::error_bars::{Evidence, Noise, PatchNoise};
-use crate::glossy::GlossyPatches;
-use crate::params::{Params, Representation};
+use crate::params::Representation;
 use crate::solution::{GlossySolution, Solution};
 use crate::tally::Tally;
-use crate::waves::{Waves, Workspace, balance};
+use crate::wave::OutputState;
+use crate::waves::{Surroundings, Waves, Workspace, balance};
 
 const STREAM_REPLICA: u64 = 5;
 
@@ -20,17 +22,20 @@ const STREAM_REPLICA: u64 = 5;
 #[derive(Debug)]
 pub(crate) struct Replicas {
     runs: [Waves; 2],
+    /// Sums of both, and their difference where that is told apart.
+    output: OutputState,
     workspace: Workspace,
 }
 
 impl Replicas {
-    pub(crate) fn new(scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Self {
-        let mut workspace = Workspace::new(scene.len(), glossy.patches().len());
-        let runs = [0, 1].map(|k| {
-            let seed = Stream::new(params.seed, STREAM_REPLICA, k).bits();
-            Waves::new(scene, glossy, &Params { seed, ..params.clone() }, &mut workspace)
+    pub(crate) fn new(around: Surroundings) -> Self {
+        let mut workspace = Workspace::default();
+        let mut output = OutputState::new(around.scene.len(), around.glossy);
+        let runs = [(0, 1.0), (1, -1.0)].map(|(k, sign)| {
+            let seed = Stream::new(around.params.seed, STREAM_REPLICA, k).bits();
+            Waves::new(around, seed, sign, &mut output, &mut workspace)
         });
-        Self { runs, workspace }
+        Self { runs, output, workspace }
     }
 
     /// Rays of both.
@@ -39,39 +44,53 @@ impl Replicas {
     }
 
     /// One wave each.
-    pub(crate) fn advance(&mut self, scene: &PatchScene, glossy: &GlossyPatches) {
-        self.runs.iter_mut().for_each(|run| run.advance(scene, glossy, &mut self.workspace));
+    pub(crate) fn advance(&mut self, around: Surroundings) {
+        // In a glossy scene the warm start takes lobes for diffuse: that is good enough to start from, but kept in the
+        // output it would be a bias that fades as 1/n only.
+        if !around.glossy.patches().is_empty() && self.runs.iter().all(Waves::is_new) {
+            self.output.clear();
+            self.runs.iter_mut().for_each(Waves::forget_output);
+        }
+        self.runs.iter_mut().for_each(|run| run.advance(around, &mut self.output, &mut self.workspace));
     }
 
     pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
         self.noise(scene).relative_error(scene)
     }
 
-    fn noise<'a>(&'a self, scene: &'a PatchScene) -> Noise<impl Fn(PatchId) -> PatchNoise + use<'a>> {
-        let [a, b] = &self.runs;
-        let of = move |p| {
-            let [first, second] = [a, b].map(|run| run.irradiance(scene, p).luminance());
-            let (x, y) = (a.evidence(p), b.evidence(p));
-            PatchNoise {
-                irradiance: 0.5 * (first + second),
-                evidence: Evidence { squares: x.squares + y.squares, hits: x.hits.saturating_add(y.hits) },
-                half_difference: Some(0.5 * (first - second)),
-            }
-        };
-        Noise { rays: a.weight() + b.weight(), of }
+    /// Weight of the sums: rays, but for what was forgotten.
+    fn weight(&self) -> f64 {
+        self.runs.iter().map(Waves::weight).sum()
     }
 
-    pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
-        let [a, b] = &self.runs;
-        let irradiance = |p| (a.irradiance(scene, p) + b.irradiance(scene, p)) * 0.5;
+    fn irradiance(&self, scene: &PatchScene, patch: PatchId) -> Rgb {
+        Rgb::from_array(self.output.deposits[patch.index()]) / (self.weight() * scene.area(patch))
+    }
+
+    fn noise<'a>(&'a self, scene: &'a PatchScene) -> Noise<impl Fn(PatchId) -> PatchNoise + use<'a>> {
+        let of = move |p: PatchId| {
+            let evidence = self.output.evidence[p.index()];
+            PatchNoise {
+                irradiance: self.irradiance(scene, p).luminance(),
+                evidence: Evidence { squares: f64::from(evidence.squares), hits: evidence.hits },
+                // Both have half of the weight.
+                half_difference: Some(f64::from(evidence.difference) / (self.weight() * scene.area(p))),
+            }
+        };
+        Noise { rays: self.weight(), of }
+    }
+
+    pub(crate) fn solution(&self, around: Surroundings) -> Solution {
+        let Surroundings { scene, glossy, params, .. } = around;
         let glossy_light = glossy.patches().iter().enumerate().map(|(k, &p)| {
-            let (a, b) = (a.glossy_light(scene, glossy, p, k), b.glossy_light(scene, glossy, p, k));
-            let observed = a.observed_lobe.zip(b.observed_lobe);
+            let per_area = 1.0 / (self.weight() * scene.area(p));
+            let observed = self.output.observed.get(k).filter(|_| glossy.to_eye(k).is_some());
+            let observed = observed.filter(|_| params.representation != Representation::Main);
             GlossySolution {
-                main_part: (a.main_part + b.main_part) * 0.5,
+                main_part: Rgb::from_f32(self.output.reflected[k]) * (per_area / PI),
                 // A representative is one sample whoever remembers it; its average over solutions is what converges.
-                directional: a.directional,
-                observed_lobe: observed.map(|(a, b)| [0, 1].map(|i| (a[i] + b[i]) * 0.5)),
+                directional: self.runs[0].representatives()[k].directional(scene, p, params.representation),
+                observed_lobe: observed.map(|parts| parts.map(|part| Rgb::from_f32(part) * per_area)),
             }
         });
         let glossy_light = glossy_light.collect();
@@ -80,9 +99,9 @@ impl Replicas {
         let noise = self.noise(scene);
         Solution {
             rays: self.rays(),
-            irradiance: scene.patches().map(|p| irradiance(p).to_f32()).collect(),
+            irradiance: scene.patches().map(|p| self.irradiance(scene, p).to_f32()).collect(),
             standard_error: noise.standard_errors(scene),
-            hits: scene.patches().map(|p| (noise.of)(p).evidence.hits).collect(),
+            hits: self.output.evidence.iter().map(|e| e.hits).collect(),
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&tally, scene.emitted_power(), noise.rays),

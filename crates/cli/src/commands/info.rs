@@ -30,7 +30,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
     warnings.extend(commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene)));
 
     let glossy = patches.patches().filter(|&p| patches.is_glossy(p)).count();
-    let state = state_bytes(patches.len(), glossy);
+    let state = state_bytes(patches.len(), glossy, false);
     let [kernel, constants] = patches.bytes();
     let (low, high) = patches.bounding_box();
     let size = high - low;

@@ -7,5 +7,5 @@ pub mod sobol;
 pub mod stream;
 pub mod warp;
 
-pub use sobol::Sobol;
+pub use sobol::{Sobol, SobolBlock};
 pub use stream::Stream;

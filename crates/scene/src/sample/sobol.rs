@@ -3,8 +3,8 @@
 //! Direction numbers: Joe and Kuo, "Constructing Sobol sequences with better two-dimensional projections",
 //! SIAM J. Sci. Comput. 30, 2008. Scrambling: the hash form of Owen's nested permutation (Laine and Karras
 //! 2011; Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020) with Vegdahl's constants (2021).
-//! Points come in blocks of 2³², each scrambled anew; below 2⁻³² a block's points are independent, as full
-//! Owen scrambling would have them, so that dimension 0 has 53 bits for the choice among many patches.
+//! Points come in blocks of 2³², each scrambled anew; in dimension 0 a block's points are independent below 2⁻³², as
+//! full Owen scrambling would have them, so that it has 53 bits for the choice among many patches.
 
 use std::sync::Arc;
 
@@ -17,7 +17,8 @@ pub const DIMENSIONS: usize = 5;
 #[derive(Clone, Debug)]
 pub struct Sobol {
     seed: u64,
-    /// `tables[dimension][byte of the index][value of the byte]`: four look-ups instead of 32 bit tests.
+    /// `tables[dimension][byte of the index][value of the byte]`: four look-ups instead of 32 bit tests. Digits stand
+    /// in reverse, first after the binary point lowest, as scrambling wants them.
     tables: Arc<[[[u32; 256]; 4]; DIMENSIONS]>,
 }
 
@@ -30,7 +31,7 @@ impl Sobol {
             for (byte, row) in table.iter_mut().enumerate() {
                 for (value, entry) in row.iter_mut().enumerate() {
                     for bit in (0..8).filter(|bit| value >> bit & 1 == 1) {
-                        *entry ^= columns[8 * byte + bit];
+                        *entry ^= columns[8 * byte + bit].reverse_bits();
                     }
                 }
             }
@@ -43,30 +44,63 @@ impl Sobol {
         Self { seed, tables: Arc::clone(&self.tables) }
     }
 
+    /// The block of 2³² points that holds point `index`.
+    #[inline]
+    pub fn block(&self, index: u64) -> SobolBlock<'_> {
+        let key = mix(self.seed ^ mix(index >> 32));
+        SobolBlock {
+            tables: &self.tables,
+            key,
+            scrambles: std::array::from_fn(|d| mix(key.wrapping_add(d as u64 + 1)) as u32),
+        }
+    }
+
     /// Point `index`, every coordinate in [0, 1).
     #[inline]
     pub fn point(&self, index: u64) -> [f64; DIMENSIONS] {
-        let (block, low) = (index >> 32, index as u32);
-        let bytes = low.to_le_bytes();
-        let block_key = mix(self.seed ^ mix(block));
-        let point_key = mix(block_key ^ u64::from(low).wrapping_mul(0xD6E8_FEB8_6659_FD93));
+        self.block(index).point(index as u32)
+    }
+}
+
+/// 2³² points under one scramble.
+#[derive(Clone, Copy, Debug)]
+pub struct SobolBlock<'a> {
+    tables: &'a [[[u32; 256]; 4]; DIMENSIONS],
+    key: u64,
+    scrambles: [u32; DIMENSIONS],
+}
+
+impl SobolBlock<'_> {
+    /// The first 32 binary digits of dimension 0 at point `low` of the block. Of 2ᵏ points from a multiple of 2ᵏ on,
+    /// no two agree in the first k.
+    #[inline]
+    pub fn first_digits(&self, low: u32) -> u32 {
+        // The first matrix is the identity but for the order of digits.
+        owen_scramble(low, self.scrambles[0])
+    }
+
+    /// Point `low` of the block: 53 bits in dimension 0, 32 in the others.
+    #[inline]
+    pub fn point(&self, low: u32) -> [f64; DIMENSIONS] {
+        let [b0, b1, b2, b3] = low.to_le_bytes().map(usize::from);
+        let below = mix(mix(self.key ^ u64::from(low).wrapping_mul(0xD6E8_FEB8_6659_FD93))) as u32;
         std::array::from_fn(|d| {
+            if d == 0 {
+                return to_unit(u64::from(self.first_digits(low)) << 32 | u64::from(below));
+            }
             let t = &self.tables[d];
-            let digits =
-                t[0][bytes[0] as usize] ^ t[1][bytes[1] as usize] ^ t[2][bytes[2] as usize] ^ t[3][bytes[3] as usize];
-            let high = owen_scramble(digits, mix(block_key.wrapping_add(d as u64 + 1)) as u32);
-            let below = mix(point_key.wrapping_add(d as u64)) as u32;
-            to_unit(u64::from(high) << 32 | u64::from(below))
+            let digits = t[0][b0] ^ t[1][b1] ^ t[2][b2] ^ t[3][b3];
+            f64::from(owen_scramble(digits, self.scrambles[d])) * (1.0 / (1u64 << 32) as f64)
         })
     }
 }
 
-/// Owen scrambling of the digits after the binary point, most significant first.
+/// Owen scrambling of the digits after the binary point, given the first one lowest, returned the first one highest.
 #[inline]
-fn owen_scramble(digits: u32, seed: u32) -> u32 {
-    // On reversed bits, multiplication and addition carry only towards less significant digits of the original:
-    // each digit is flipped depending on the digits before it, which is what nested scrambling means.
-    let mut x = digits.reverse_bits();
+fn owen_scramble(reversed: u32, seed: u32) -> u32 {
+    // Multiplication and addition carry only upwards, that is towards less significant digits of the original: each
+    // digit is flipped depending on the digits before it, which is what nested scrambling means.
+    let mut x = reversed;
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(seed);
     x = x.wrapping_mul((seed >> 16) | 1);
@@ -132,6 +166,20 @@ mod tests {
             let mut seen = vec![false; 1024];
             (0..1024).for_each(|i| seen[(sobol.point(i)[d] * 1024.0) as usize] = true);
             assert!(seen.iter().all(|&s| s), "dimension {d}");
+        }
+    }
+
+    /// What the waves of the solver rely on to shoot in order of dimension 0 without sorting.
+    #[test]
+    fn aligned_points_have_distinct_first_digits() {
+        let sobol = Sobol::new(5);
+        for start in [0u64, 3 << 12, (1 << 32) + (7 << 12)] {
+            let mut seen = vec![false; 4096];
+            for index in start..start + 4096 {
+                let first = sobol.block(index).first_digits(index as u32);
+                assert_eq!(f64::from(first >> 20), (sobol.point(index)[0] * 4096.0).floor());
+                assert!(!std::mem::replace(&mut seen[(first >> 20) as usize], true));
+            }
         }
     }
 

@@ -1,0 +1,405 @@
+//! The end of a wave: deposits are added to their patches, and what rays start from moves on.
+//!
+//! Bucket by bucket: each is summed by one thread in 64-bit fixed point (no order of tasks, threads or machines changes
+//! a bit), then entered with the wave's weights into the output, which remembers everything, and into the source,
+//! which forgets. Sums of a wave live only here, so that a patch has no memory for them.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+use twinray_scene::brdf::Brdf;
+use twinray_scene::sample::Stream;
+use twinray_scene::sample::stream::{mix, to_unit};
+use twinray_scene::{PatchId, PatchScene, Rgb};
+
+use super::deposits::{Buckets, Deposit};
+use super::{Task, Wave, WaveContext};
+use crate::direction;
+use crate::error_bars::PackedEvidence;
+use crate::fixed::{FixedRgb, Units};
+use crate::glossy::GlossyPatches;
+use crate::params::Representation;
+use crate::source::{PackedRepresentative, Source};
+
+const STREAM_ACCEPT: u64 = 3;
+
+/// What one run of waves starts rays from.
+#[derive(Debug)]
+pub(crate) struct SourceState {
+    pub sources: Vec<Source>,
+    /// Per glossy patch.
+    pub representatives: Vec<PackedRepresentative>,
+}
+
+/// What all runs have brought so far.
+#[derive(Debug)]
+pub(crate) struct OutputState {
+    /// Per patch: Σ deposits, W.
+    pub deposits: Vec<[f64; 3]>,
+    /// Per patch.
+    pub evidence: Vec<PackedEvidence>,
+    /// Per glossy patch: Σ deposit · albedo(ω_in).
+    pub reflected: Vec<[f32; 3]>,
+    /// Per glossy patch, if there is an observer: Σ deposit · lobe(ω_in, ω_eye), of light straight from emitting patches
+    /// and of all other.
+    pub observed: Vec<[[f32; 3]; 2]>,
+}
+
+/// Bytes of a patch in an [`OutputState`] and in two [`SourceState`]s.
+pub(crate) const BYTES_PER_PATCH: usize = 24 + size_of::<PackedEvidence>() + 2 * size_of::<Source>();
+/// Bytes of a glossy patch beside that, without an observer.
+pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = 12 + 2 * size_of::<PackedRepresentative>();
+/// Bytes that an observer adds to a glossy patch.
+pub(crate) const BYTES_PER_OBSERVED_PATCH: usize = 24;
+
+impl OutputState {
+    pub(crate) fn new(patches: usize, glossy: &GlossyPatches) -> Self {
+        let lobes = glossy.patches().len();
+        Self {
+            deposits: vec![[0.0; 3]; patches],
+            evidence: vec![PackedEvidence::default(); patches],
+            reflected: vec![[0.0; 3]; lobes],
+            observed: vec![[[0.0; 3]; 2]; if glossy.is_observed() { lobes } else { 0 }],
+        }
+    }
+
+    /// Begins anew.
+    pub(crate) fn clear(&mut self) {
+        self.deposits.fill([0.0; 3]);
+        self.evidence.fill(PackedEvidence::default());
+        self.reflected.fill([0.0; 3]);
+        self.observed.fill([[0.0; 3]; 2]);
+    }
+}
+
+/// What becomes of a wave's deposits.
+#[derive(Debug)]
+pub(crate) struct Closing {
+    pub units: Units,
+    /// Rays that were shot.
+    pub rays: u64,
+    /// The deposits' weight in the output; 0 leaves it alone.
+    pub output: f64,
+    /// +1 or −1: which of two replicas this is.
+    pub sign: f64,
+    /// Seed of the choice among candidates for the representatives.
+    pub seed: u64,
+    pub update: Update,
+}
+
+/// How the source moves on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Update {
+    /// A wave: the source forgets this fraction of itself for the wave's mean.
+    Blend(f64),
+    /// A step of the warm start: deposits times this are the light that is sent on by the next step, and what they bring
+    /// is added to the source.
+    Step(f64),
+}
+
+/// Power that arrived on patches, and what of it they sent on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Closed {
+    pub arrived: Rgb,
+    pub reflected: Rgb,
+}
+
+impl Wave {
+    /// Enters the deposits of the wave that was shot last. `unshot` is filled by [`Update::Step`], otherwise empty.
+    pub(crate) fn close(
+        &self,
+        context: &WaveContext,
+        closing: &Closing,
+        state: &mut SourceState,
+        unshot: &mut [Source],
+        output: &mut OutputState,
+    ) -> Closed {
+        let parts = parts(context, state, unshot, output);
+        let closed: Vec<Closed> = parts
+            .into_par_iter()
+            .map_init(Sums::default, |sums, mut part| {
+                sums.add(context, closing, &self.tasks, &part);
+                part.enter(context, closing, sums)
+            })
+            .collect();
+        let mut total = Closed::default();
+        for c in closed {
+            total.arrived += c.arrived;
+            total.reflected += c.reflected;
+        }
+        total
+    }
+}
+
+/// A bucket's own slices of the state.
+struct Part<'a> {
+    bucket: usize,
+    first: usize,
+    first_glossy: usize,
+    sources: &'a mut [Source],
+    unshot: &'a mut [Source],
+    deposits: &'a mut [[f64; 3]],
+    evidence: &'a mut [PackedEvidence],
+    representatives: &'a mut [PackedRepresentative],
+    reflected: &'a mut [[f32; 3]],
+    observed: &'a mut [[[f32; 3]; 2]],
+}
+
+fn parts<'a>(
+    context: &WaveContext,
+    state: &'a mut SourceState,
+    unshot: &'a mut [Source],
+    output: &'a mut OutputState,
+) -> Vec<Part<'a>> {
+    let buckets = Buckets::of(context.scene.len());
+    let (mut sources, mut unshot) = (&mut state.sources[..], unshot);
+    let (mut deposits, mut evidence) = (&mut output.deposits[..], &mut output.evidence[..]);
+    let mut representatives = &mut state.representatives[..];
+    let (mut reflected, mut observed) = (&mut output.reflected[..], &mut output.observed[..]);
+    let glossy = context.glossy.patches();
+    let mut first_glossy = 0;
+    (0..buckets.count())
+        .map(|bucket| {
+            let first = bucket * buckets.size();
+            let end = (first + buckets.size()).min(context.scene.len());
+            let end_glossy = glossy.partition_point(|p| p.index() < end);
+            let (patches, lobes) = (end - first, end_glossy - first_glossy);
+            let part = Part {
+                bucket,
+                first,
+                first_glossy,
+                sources: take(&mut sources, patches),
+                unshot: take(&mut unshot, patches),
+                deposits: take(&mut deposits, patches),
+                evidence: take(&mut evidence, patches),
+                representatives: take(&mut representatives, lobes),
+                reflected: take(&mut reflected, lobes),
+                observed: take(&mut observed, lobes),
+            };
+            first_glossy = end_glossy;
+            part
+        })
+        .collect()
+}
+
+/// Cuts the first `count` off a slice; of what is empty, nothing.
+fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    rest.split_off_mut(..count.min(rest.len())).unwrap_or_default()
+}
+
+/// A bucket's sums of one wave.
+#[derive(Debug, Default)]
+struct Sums {
+    patches: Vec<PatchSums>,
+    glossy: Vec<GlossySums>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct PatchSums {
+    deposits: FixedRgb,
+    squares: i64,
+    hits: u32,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct GlossySums {
+    reflected: FixedRgb,
+    observed: [FixedRgb; 2],
+    importance: i64,
+    best: Option<Candidate>,
+}
+
+/// A candidate for a glossy patch's representative.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    /// Exponential variate over importance: the smallest of a wave is drawn in proportion to importance.
+    key: f64,
+    power: Rgb,
+    from: u32,
+}
+
+impl Sums {
+    /// Sums all that the tasks left in a bucket.
+    fn add(&mut self, context: &WaveContext, closing: &Closing, tasks: &[Task], part: &Part) {
+        self.patches.clear();
+        self.patches.resize(part.sources.len(), PatchSums::default());
+        self.glossy.clear();
+        self.glossy.resize(part.representatives.len(), GlossySums::default());
+        let units = closing.units;
+        for task in tasks {
+            let (deposits, from) = task.deposits.bucket(part.bucket);
+            for (k, deposit) in deposits.iter().enumerate() {
+                if deposit.is_nothing() {
+                    continue;
+                }
+                if !deposit.is_direct_part() {
+                    let sums = &mut self.patches[deposit.patch().index() - part.first];
+                    let power = deposit.power();
+                    sums.deposits.add(power, units.deposit);
+                    // Squares span twice the orders of magnitude that deposits do, so they are rounded at random.
+                    let [a, b] = deposit.bits();
+                    let square = power.luminance() * power.luminance();
+                    sums.squares += units.square.quantize_dithered(square, to_unit(mix(a ^ b.rotate_left(32))));
+                    sums.hits += 1;
+                }
+                if let Some(number) = context.glossy.number_of(deposit.patch()) {
+                    let lobe = &mut self.glossy[number - part.first_glossy];
+                    lobe.add(context, closing, deposit, from[k], number);
+                }
+            }
+        }
+    }
+}
+
+impl GlossySums {
+    fn add(&mut self, context: &WaveContext, closing: &Closing, deposit: &Deposit, from: u32, number: usize) {
+        let (patch, power) = (deposit.patch(), deposit.power());
+        let (n, wi) = (context.scene.normal(patch), direction::unpack(from));
+        let brdf = context.scene.brdf(patch);
+        let unit = closing.units.deposit;
+        if context.representation != Representation::Main
+            && let Some(eye) = context.glossy.to_eye(number)
+        {
+            let lobe = power * brdf.lobe_eval(n, wi, eye);
+            if deposit.is_direct_part() {
+                self.observed[0].add(lobe, unit);
+                self.observed[1].add(-lobe, unit);
+            } else {
+                self.observed[1].add(lobe, unit);
+            }
+        }
+        if deposit.is_direct_part() {
+            return;
+        }
+        let cosine = n.dot(wi).max(0.0);
+        let albedo = brdf.albedo(cosine);
+        self.reflected.add(power * albedo, unit);
+        let importance = match context.representation {
+            Representation::Main => return,
+            Representation::Sample => (power * albedo).luminance(),
+            _ => (power * brdf.lobe_albedo(cosine)).luminance(),
+        };
+        if importance > 0.0 && cosine > 0.0 {
+            self.importance += unit.quantize(importance);
+            // A number from the deposit's own bits: the same whoever shot it, in whatever order.
+            let [a, b] = deposit.bits();
+            let uniform = to_unit(mix(mix(closing.seed ^ a) ^ mix(b ^ u64::from(from) << 32)));
+            let key = -libm::log(1.0 - uniform) / importance;
+            if self.best.is_none_or(|best| key < best.key) {
+                self.best = Some(Candidate { key, power, from });
+            }
+        }
+    }
+}
+
+impl Part<'_> {
+    /// Enters the sums into the state.
+    fn enter(&mut self, context: &WaveContext, closing: &Closing, sums: &Sums) -> Closed {
+        let scene = context.scene;
+        let units = closing.units;
+        let mut closed = Closed::default();
+        for (i, sum) in sums.patches.iter().enumerate() {
+            let patch = PatchId((self.first + i) as u32);
+            let arrived = sum.deposits.value(units.deposit);
+            let number = context.glossy.number_of(patch).map(|k| k - self.first_glossy);
+            let reflected = match number {
+                Some(k) => sums.glossy[k].reflected.value(units.deposit),
+                None => arrived * diffuse_albedo(scene, patch),
+            };
+            closed.arrived += arrived;
+            closed.reflected += reflected;
+            self.output(closing, i, sum, arrived);
+            if let Some(k) = number {
+                self.output_lobe(closing, k, &sums.glossy[k], reflected);
+                self.remember(context, closing, patch, k, &sums.glossy[k]);
+            }
+            self.move_on(context, closing, patch, i, number, reflected);
+        }
+        closed
+    }
+
+    fn output(&mut self, closing: &Closing, i: usize, sum: &PatchSums, arrived: Rgb) {
+        if closing.output == 0.0 || sum.hits == 0 {
+            return;
+        }
+        let entered = arrived * closing.output;
+        self.deposits[i] = (Rgb::from_array(self.deposits[i]) + entered).to_array();
+        let squares = sum.squares as f64 * closing.units.square.value() * closing.output * closing.output;
+        let evidence = &mut self.evidence[i];
+        evidence.squares += squares as f32;
+        evidence.difference += (closing.sign * entered.luminance()) as f32;
+        evidence.hits = evidence.hits.saturating_add(sum.hits);
+    }
+
+    fn output_lobe(&mut self, closing: &Closing, k: usize, sum: &GlossySums, reflected: Rgb) {
+        if closing.output == 0.0 {
+            return;
+        }
+        let add = |to: &mut [f32; 3], value: Rgb| *to = (Rgb::from_f32(*to) + value * closing.output).to_f32();
+        add(&mut self.reflected[k], reflected);
+        if let Some(observed) = self.observed.get_mut(k) {
+            for (to, part) in observed.iter_mut().zip(&sum.observed) {
+                add(to, part.value(closing.units.deposit));
+            }
+        }
+    }
+
+    /// One acceptance or rejection per patch and wave, on the wave's total: the chain runs over waves, and no thread
+    /// can change it.
+    fn remember(&mut self, context: &WaveContext, closing: &Closing, patch: PatchId, k: usize, sum: &GlossySums) {
+        let representative = &mut self.representatives[k];
+        let area = context.scene.area(patch);
+        let importance = sum.importance as f64 * closing.units.deposit.value() / area;
+        let before = f64::from(representative.importance);
+        representative.importance = match closing.update {
+            Update::Blend(fraction) => before + fraction * (importance / closing.rays as f64 - before),
+            Update::Step(per) => before + importance * per,
+        } as f32;
+        if let Some(best) = sum.best {
+            let u = match context.representation {
+                Representation::Last => 0.0,
+                _ => Stream::new(closing.seed, STREAM_ACCEPT, (self.first_glossy + k) as u64).uniform(),
+            };
+            representative.offer(best.power / area, best.from, importance / closing.rays as f64, u);
+        }
+    }
+
+    fn move_on(
+        &mut self,
+        context: &WaveContext,
+        closing: &Closing,
+        patch: PatchId,
+        i: usize,
+        number: Option<usize>,
+        reflected: Rgb,
+    ) {
+        let per_area = 1.0 / (PI * context.scene.area(patch));
+        let source = &mut self.sources[i];
+        match closing.update {
+            Update::Blend(fraction) => {
+                let emitted = context.scene.emission(patch);
+                // The sample alone stands for all reflected light, once there is one.
+                let sample = context.representation == Representation::Sample
+                    && number.is_some_and(|k| self.representatives[k].is_there());
+                let now = source.radiance();
+                let mean = emitted + reflected * (per_area / closing.rays as f64);
+                let next = if sample { emitted } else { now + (mean - now) * fraction };
+                source.constant = next.to_f32();
+            }
+            Update::Step(per) => {
+                let next = reflected * (per_area * per);
+                source.constant = (source.radiance() + next).to_f32();
+                self.unshot[i].constant = next.to_f32();
+            }
+        }
+    }
+}
+
+/// Albedo of a diffuse patch.
+#[inline]
+fn diffuse_albedo(scene: &PatchScene, patch: PatchId) -> Rgb {
+    match scene.brdf(patch) {
+        Brdf::Lambertian { reflectance } => reflectance,
+        other => other.mean_albedo(),
+    }
+}

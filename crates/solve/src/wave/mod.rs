@@ -1,0 +1,272 @@
+//! A wave: many rays against one frozen state. Select → shoot → trace → estimate here; deposits in `close`.
+//!
+//! Everything is a pure function of the state and the ray's number. Rays are shot in tasks, each a range of the first
+//! of their numbers (`order`); a task runs one stage after the other over all of its rays, so that the processor
+//! has many independent loads to wait for at a time, and leaves its deposits sorted by buckets of patches (`deposits`).
+
+pub(crate) mod close;
+mod deposits;
+mod order;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use twinray_scene::sample::{Sobol, SobolBlock, Stream};
+use twinray_scene::{PatchId, PatchScene, Rgb};
+
+pub(crate) use close::{Closing, OutputState, SourceState, Update};
+
+use crate::direction;
+use crate::frozen::Frozen;
+use crate::glossy::GlossyPatches;
+use crate::params::{Estimator, Representation};
+use crate::stage::{Lap, Stage};
+use crate::strategies::{Fit, Witness};
+use crate::tally::Tally;
+use crate::transfer::{Endpoint, transfer};
+use deposits::{Buckets, Deposit, Deposits};
+use order::Order;
+
+/// Rays of one task: few enough for its arrays to stay in a core's cache.
+const TASK: u64 = 4096;
+/// Small waves are shared out as well, down to tasks of this size.
+const SMALLEST_TASK: u64 = 256;
+/// One ray of so many is a witness for the shares of the strategies.
+const WITNESS: usize = 8;
+
+/// Purpose of the counter-based stream that finds another place where a patch has a hole.
+const STREAM_HOLES: u64 = 1;
+
+/// What all waves of a solve share.
+#[derive(Clone, Copy)]
+pub(crate) struct WaveContext<'a> {
+    pub scene: &'a PatchScene,
+    pub glossy: &'a GlossyPatches,
+    /// Combination of the two transfers.
+    pub estimator: Estimator,
+    /// Directional memory.
+    pub representation: Representation,
+    /// Seed of the streams.
+    pub seed: u64,
+    /// Told at the end of every stage.
+    pub lap: Lap<'a>,
+}
+
+/// What a wave works with; memory that waves take turns to use.
+#[derive(Debug, Default)]
+pub(crate) struct Wave {
+    order: Order,
+    tasks: Vec<Task>,
+}
+
+/// What a task leaves.
+#[derive(Debug, Default)]
+struct Task {
+    deposits: Deposits,
+    tally: Tally,
+    fit: Fit,
+}
+
+/// Where a ray started and what it met.
+#[derive(Clone, Copy, Debug)]
+struct Shot {
+    /// Where it started: a patch, or [`SKY`].
+    shooter: u32,
+    /// What it met: a patch, [`SKY`] or [`BACK`].
+    far: u32,
+    /// From the shooter to the far end, unit length.
+    direction: DVec3,
+    /// Where it started on the shooter; of rays from the sky, the origin.
+    point: DVec3,
+}
+
+/// The environment as an end of a ray.
+const SKY: u32 = u32::MAX;
+/// The absorbing back of a one-sided surface.
+const BACK: u32 = u32::MAX - 1;
+
+impl Shot {
+    fn patch(end: u32) -> Option<PatchId> {
+        (end < BACK).then_some(PatchId(end))
+    }
+}
+
+impl WaveContext<'_> {
+    /// Shoots rays `first .. first + count` of the sequence against `frozen`; what they leave stays in `wave`.
+    /// `witness` judges how much a deposit's square matters. Returns sums over rays in their order.
+    pub(crate) fn shoot(
+        &self,
+        frozen: &Frozen,
+        sobol: &Sobol,
+        first: u64,
+        count: u64,
+        witness: Option<&Witness>,
+        wave: &mut Wave,
+    ) -> (Tally, Fit) {
+        let Wave { order, tasks } = wave;
+        order.fill(sobol, first, count);
+        (self.lap)(Stage::Order);
+        let wished = (count / TASK).max((count / SMALLEST_TASK).min(16)).max(1);
+        let number = (wished.next_power_of_two() as usize).min(order.places());
+        tasks.resize_with(number, Task::default);
+        let runs: Vec<SobolBlock> = order.bases().map(|base| sobol.block(base)).collect();
+        let bases: Vec<u64> = order.bases().collect();
+        let places = order.places() / number;
+        tasks.par_iter_mut().enumerate().for_each_init(Vec::new, |shots, (t, task)| {
+            (task.tally, task.fit) = Default::default();
+            (self.lap)(Stage::Wait);
+            self.start(frozen, order, &runs, &bases, t * places..(t + 1) * places, shots, task);
+            (self.lap)(Stage::Shoot);
+            self.trace(shots);
+            (self.lap)(Stage::Trace);
+            self.estimate(frozen, shots, witness, task);
+            (self.lap)(Stage::Estimate);
+        });
+        let mut totals = (Tally::default(), Fit::default());
+        for task in tasks.iter() {
+            totals.0.add_weighted(&task.tally, 1.0);
+            totals.1.add(&task.fit);
+        }
+        totals
+    }
+
+    /// Selects patches and shoots: fills `shots` with where rays start and where they go.
+    fn start(
+        &self,
+        frozen: &Frozen,
+        order: &Order,
+        runs: &[SobolBlock],
+        bases: &[u64],
+        places: std::ops::Range<usize>,
+        shots: &mut Vec<Shot>,
+        task: &mut Task,
+    ) {
+        shots.clear();
+        let mut cursor = 0;
+        for place in places {
+            for (run, block) in runs.iter().enumerate() {
+                let Some(low) = order.at(run, place) else { continue };
+                let index = bases[run] + u64::from(low);
+                task.tally.rays += 1;
+                shots.extend(self.shot(frozen, index, block.point(index as u32), &mut cursor));
+            }
+        }
+    }
+
+    /// The ray of point `u`; `None` if its direction fell below the horizon: it carries nothing.
+    #[inline]
+    fn shot(&self, frozen: &Frozen, index: u64, u: [f64; 5], cursor: &mut usize) -> Option<Shot> {
+        let Some(shooter) = frozen.select(u[0], cursor) else {
+            let (point, direction) = self.scene.environment()?.sample_line([u[1], u[2]], [u[3], u[4]]);
+            return Some(Shot { shooter: SKY, far: SKY, direction, point });
+        };
+        let n = self.scene.normal(shooter);
+        let direction = frozen.outgoing(shooter).sample(n, [u[3], u[4]])?;
+        if n.dot(direction) <= 0.0 {
+            return None;
+        }
+        let mut holes = None;
+        let redraw = || holes.get_or_insert_with(|| Stream::new(self.seed, STREAM_HOLES, index)).uniform();
+        let point = self.scene.sample_point(shooter, u[1], u[2], redraw);
+        Some(Shot { shooter: shooter.0, far: SKY, direction, point })
+    }
+
+    fn trace(&self, shots: &mut [Shot]) {
+        for shot in shots {
+            let hit = match Shot::patch(shot.shooter) {
+                Some(shooter) => self.scene.trace_from(shooter, shot.point, shot.direction),
+                None => self.scene.trace(shot.point, shot.direction),
+            };
+            shot.far = match hit {
+                Some(hit) => self.scene.patch_of(&hit).map_or(BACK, |p| p.0),
+                None => SKY,
+            };
+        }
+    }
+
+    /// Turns rays into deposits.
+    fn estimate(&self, frozen: &Frozen, shots: &[Shot], witness: Option<&Witness>, task: &mut Task) {
+        let buckets = Buckets::of(self.scene.len());
+        let glossy = !self.glossy.patches().is_empty();
+        // What part of a deposit is direct light matters only where a picture of a glossy patch is summed.
+        let tells_direct = frozen.emits() && self.glossy.is_observed();
+        let splits = |patch, far| {
+            let lamp = tells_direct && self.glossy.number_of(patch).is_some();
+            lamp && Shot::patch(far).is_some_and(|far| frozen.is_lamp(far))
+        };
+        let targets = shots.iter().flat_map(|shot| {
+            let ends = [(shot.shooter, shot.far), (shot.far, shot.shooter)];
+            ends.into_iter().flat_map(|(end, far)| {
+                let patch = Shot::patch(end).filter(|_| far != BACK);
+                let direct_part = patch.filter(|&p| splits(p, far));
+                [patch, direct_part].into_iter().flatten()
+            })
+        });
+        task.deposits.prepare(buckets, glossy, targets);
+
+        let Task { deposits, tally, fit } = task;
+        let endpoint = |end: u32, direction: DVec3| match Shot::patch(end) {
+            Some(patch) => frozen.endpoint(patch, direction),
+            None => frozen.sky(-direction),
+        };
+        for (k, shot) in shots.iter().enumerate() {
+            let here = endpoint(shot.shooter, shot.direction);
+            if shot.far == BACK {
+                // From outside, the sky meets outer faces, whose backs absorb without a loss.
+                if shot.shooter != SKY {
+                    tally.lost += here.radiance / here.density;
+                }
+                continue;
+            }
+            let there = endpoint(shot.far, -shot.direction);
+            let (on_far, on_shooter) = if shot.shooter == SKY || shot.far == SKY {
+                if shot.shooter == shot.far {
+                    continue;
+                }
+                let d = transfer(self.estimator, &here, &there);
+                let (sky, escaped) =
+                    if shot.far == SKY { (d.on_shooter, d.on_hit) } else { (d.on_hit, d.on_shooter) };
+                tally.sky += sky;
+                tally.escaped += escaped;
+                (d.on_hit, d.on_shooter)
+            } else {
+                let d = transfer(self.estimator, &here, &there);
+                (d.on_hit, d.on_shooter)
+            };
+            let ends = [
+                (shot.far, on_far, shot.shooter, &here, -shot.direction),
+                (shot.shooter, on_shooter, shot.far, &there, shot.direction),
+            ];
+            for (end, power, far, from, wi) in ends {
+                let Some(patch) = Shot::patch(end) else { continue };
+                let power = if power.is_finite() {
+                    power
+                } else {
+                    tally.invalid += 1;
+                    Rgb::BLACK
+                };
+                let wi = (glossy && self.glossy.number_of(patch).is_some()).then(|| direction::pack(wi));
+                deposits.push(buckets, Deposit::new(patch, power, false), wi);
+                if splits(patch, far) {
+                    let direct = power * emitted_share(self.scene, PatchId(far), from.radiance);
+                    deposits.push(buckets, Deposit::new(patch, direct, true), wi);
+                }
+            }
+            if let Some(witness) = witness.filter(|_| k % WITNESS == 0) {
+                let parts = |end: u32, e: &Endpoint| match Shot::patch(end) {
+                    Some(patch) => frozen.parts(patch, e.density),
+                    None => [0.0, 0.0, 0.0, 0.0, e.density],
+                };
+                let weight = |end: u32, power: Rgb| Shot::patch(end).map_or(0.0, |p| witness.square(p, power));
+                let squares = weight(shot.far, on_far) + weight(shot.shooter, on_shooter);
+                fit.observe(squares, here.density + there.density, parts(shot.shooter, &here), parts(shot.far, &there));
+            }
+        }
+    }
+}
+
+/// The share of a lamp's radiance that is its own emission, per channel.
+fn emitted_share(scene: &PatchScene, patch: PatchId, radiance: Rgb) -> Rgb {
+    let emitted = scene.emission(patch);
+    let share = |e: f64, l: f64| if e > 0.0 && l > 0.0 { e / l } else { 0.0 };
+    Rgb::new(share(emitted.r, radiance.r), share(emitted.g, radiance.g), share(emitted.b, radiance.b))
+}
