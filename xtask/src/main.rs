@@ -1,4 +1,4 @@
-//! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`. No tool has to be installed beside Rust itself.
+//! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`; `cargo xtask bench`. No tool has to be installed beside Rust itself.
 //!
 //! One line a step; the first step that fails ends the run and is named. `structure` holds the checks that need no
 //! compiler, which are tests of this crate as well.
@@ -24,14 +24,19 @@ const STEPS: &[Step] = &[
 /// Not a part of `ci`: it takes minutes, and its comparisons are tests of `crates/validate` already.
 const VALIDATE: Step = ("validate", "writes docs/validation.md and its plots anew", validate);
 
+/// Not a part of `ci` either: its figures are those of an idle machine, and nothing in it can fail.
+const BENCH: Step = ("bench", "measures, writes docs/performance.md: [--quick] [PART...]", bench);
+
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1).unwrap_or_default();
     let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
-    let steps = if wish == VALIDATE.0 { vec![&VALIDATE] } else { steps };
+    let apart = [&VALIDATE, &BENCH];
+    let steps = apart.iter().find(|(name, ..)| wish == *name).map_or(steps, |step| vec![*step]);
     if steps.is_empty() {
         eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");
         STEPS.iter().for_each(|(name, what, _)| eprintln!("  {name:10} {what}"));
-        eprintln!("\n  {:10} {}", VALIDATE.0, VALIDATE.1);
+        eprintln!();
+        apart.iter().for_each(|(name, what, _)| eprintln!("  {name:10} {what}"));
         return ExitCode::from(2);
     }
     for (name, _, run) in steps {
@@ -81,6 +86,13 @@ fn examples() -> Result<(), String> {
 
 fn validate() -> Result<(), String> {
     run(cargo().args(["run", "--quiet", "--release", "--package", "twinray-validate"]))
+}
+
+/// Whatever follows on the command line is for the benchmark.
+fn bench() -> Result<(), String> {
+    let mut command = cargo();
+    command.args(["run", "--quiet", "--release", "--package", "twinray-bench", "--"]);
+    run(command.args(std::env::args_os().skip(2)))
 }
 
 fn deps() -> Result<(), String> {

@@ -17,6 +17,7 @@ const TABLE: &[(&str, &[&str])] = &[
     ("twinray", &["twinray-rays", "twinray-scene", "twinray-solve", "twinray-render", "twinray-format"]),
     ("twinray-cli", &["twinray"]),
     ("twinray-validate", &["twinray"]),
+    ("twinray-bench", &["twinray", "twinray-rays", "twinray-validate"]),
     ("twinray-testkit", &[]),
     ("xtask", &[]),
 ];
@@ -40,8 +41,15 @@ const OUTSIDE: [&str; 11] = [
 ];
 
 /// The documents whose links and names are checked.
-const DOCUMENTS: [&str; 6] =
-    ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/paper.md", "docs/formats.md", "docs/validation.md"];
+const DOCUMENTS: [&str; 7] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CHANGELOG.md",
+    "docs/paper.md",
+    "docs/formats.md",
+    "docs/validation.md",
+    "docs/performance.md",
+];
 
 /// The root of the workspace.
 pub fn root() -> PathBuf {

@@ -1,11 +1,13 @@
 //! What `docs/validation.md` says, computed: twinray against closed forms, theory and an independent path tracer.
 //!
 //! A *case* is a function that builds a scene, solves it and gives rows of expected and measured values. The cases are
-//! tests as well, with fewer rays, so nothing in the document is unguarded. Files are written by `main` alone.
+//! tests as well, with fewer rays, so nothing in the document is unguarded. Files are written by `main` alone, and the only
+//! process is the one that asks for the `commit`.
 
 pub mod analytic;
 pub mod case;
 pub mod cie;
+pub mod commit;
 pub mod convergence;
 pub mod factors;
 pub mod plot;

@@ -3,11 +3,11 @@
 //! With the name of a part (`analytic`, `cie`, ...) only that part is computed, and written to standard output.
 
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use twinray_validate::case::{Case, Effort};
 use twinray_validate::report::{self, Section};
-use twinray_validate::{PARTS, Part};
+use twinray_validate::{PARTS, Part, commit};
 
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1);
@@ -30,7 +30,7 @@ fn main() -> ExitCode {
     match wish {
         Some(_) => sections.iter().for_each(|section| println!("{}", report::part(section))),
         None => {
-            if let Err(error) = write(&root.join("docs"), &sections, &commit(&root)) {
+            if let Err(error) = write(&root.join("docs"), &sections, &commit::hash(&root)) {
                 eprintln!("validate: docs: {error}");
                 return ExitCode::from(2);
             }
@@ -46,15 +46,4 @@ fn write(docs: &Path, sections: &[Section], commit: &str) -> std::io::Result<()>
         std::fs::write(folder.join(figure.name).with_extension("svg"), &figure.svg)?;
     }
     std::fs::write(docs.join("validation.md"), report::document(sections, commit))
-}
-
-/// What is checked out, and whether its sources were changed since.
-fn commit(root: &Path) -> String {
-    let git = |arguments: &[&str]| {
-        let output = Command::new("git").args(arguments).current_dir(root).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    let Some(hash) = git(&["rev-parse", "--short=12", "HEAD"]) else { return "unknown".to_owned() };
-    let changes = git(&["status", "--porcelain", "--", "crates", "Cargo.lock", "Cargo.toml"]).unwrap_or_default();
-    if changes.is_empty() { hash } else { format!("{hash}, with changes") }
 }
