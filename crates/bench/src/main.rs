@@ -55,8 +55,13 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let origin = Origin::of(&root);
     let chosen = PARTS.iter().filter(|p| names.is_empty() || names.contains(&&p.name.to_owned()));
     for part in chosen {
-        if let Some(record) = measured(part, effort, &origin)? {
-            if quick { println!("{}", record.text()) } else { record.write(&root)? }
+        let Some(record) = measured(part, effort, &origin)? else { continue };
+        // In words too, so that a result that cannot be told is found before the next part takes its minutes.
+        let section = (part.describe)(&record.result).map_err(|e| format!("{}: {e}", part.name))?;
+        if quick {
+            println!("{}\n{}\n", record.text(), section.text);
+        } else {
+            record.write(&root)?;
         }
     }
     if quick { Ok(()) } else { document::write(&root, PARTS) }

@@ -5,7 +5,7 @@ use twinray::scene::PatchScene;
 use twinray::solve::Params;
 use twinray_rays::{Bvh, Ray};
 
-use super::kernel::{RAYS, SCENES, SOLVER_RAYS, TURNS, rate};
+use super::kernel::{RAYS, SCENES, SOLVER_RAYS, rate};
 use super::{Effort, Outcome, Part};
 use crate::document::{Section, Target, millions, share, table, times};
 use crate::embree::{Embree, MANNERS, Scene};
@@ -18,6 +18,7 @@ use crate::solving::{pace, scene};
 pub const PART: Part =
     Part { name: "embree", what: "the same rays through Embree, where it is installed", measure, describe };
 
+const TURNS: usize = 3;
 /// Hits nearer together than this, relative to their distance, are one point of two triangles that meet there.
 const SAME_PLACE: f32 = 1e-4;
 
@@ -111,11 +112,11 @@ fn describe(result: &Value) -> Result<Section, String> {
     let text = format!(
         "The rays of the last section, unsorted ({rays:.0} a turn), through Embree {}, one ray a call, found at run time. *Robust* is \
          the scene flag that closes gaps between triangles, as our kernel does; *high quality* builds with spatial splits. \
-         Contestants take turns ({} each). Embree's manual advises to flush denormal numbers to zero; a Rust program must not, and \
-         ours do not meet any.\n\nMray/s:\n\n{}\n\nThe whole solver on two threads, to {} rays, in the same turns, against the faster of both robust \
-         trees ({faster}): {}.\n\nDo both find the same? Rays, per million, that meet another triangle in Embree: in the same place (edges \
-         that triangles share), and elsewhere (grazing rays, and rays that meet a neighbour in the plane they start in: \
-         Embree knows no triangle to skip, so rays start a millionth above it).\n\n{}",
+         Contestants take turns \
+         ({} each). Embree's manual advises to flush denormal numbers to zero, which is not done here.\n\nMray/s:\n\n{}\n\nThe whole solver on two threads, to {} rays, in the same turns, against the faster of both robust \
+         trees ({faster}): {}.\n\nDo both find the same? Rays, per million, that meet another triangle in Embree: in the same place (an edge \
+         that triangles share), and elsewhere, which would be a fault of one of the two. Embree knows no triangle to skip; rays start a \
+         millionth above theirs, as the solver's do.\n\n{}",
         top.get("version")?.text()?,
         two.turns(),
         table(&["", "1 thread", "2 threads", "twinray over it, 1 thread", "2 threads"], &rows),

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use twinray::solve::Params;
 
 use super::{Effort, Outcome, Part};
-use crate::document::{Section, Target, percent, seconds, table};
+use crate::document::{Section, Target, millions, percent, seconds, table};
 use crate::measure::{Race, pool, timed};
 use crate::results::Reader;
 use crate::solving::{Reference, scene, start};
@@ -65,7 +65,7 @@ fn describe(result: &Value) -> Result<Section, String> {
         let time = race.median(name)?;
         rows.push(vec![
             name.to_owned(),
-            number("rays")?.to_string(),
+            millions(number("rays")?),
             seconds(time),
             percent(number("error")?),
             format!("{:+.2} %", 100.0 * number("power")?),
@@ -76,12 +76,12 @@ fn describe(result: &Value) -> Result<Section, String> {
         "The paper's own run: five million iterations in a hall, here of {} patches. The paper's preset is sequential by nature: every \
          ray sees what the last one left, so it uses one thread; the default preset uses two, and rounds up to whole waves. Seconds \
          are of the solver alone, medians of {} turns. Errors are relative RMS errors of patch irradiance against two solves of together \
-         {:.0} rays, whose own noise of {} is subtracted; *power* is the deviation of the arriving power.\n\n{}",
+         {} M rays, whose own noise of {} is subtracted; *power* is the deviation of the arriving power.\n\n{}",
         number("patches")?,
         race.turns(),
-        number("reference_rays")?,
+        millions(number("reference_rays")?),
         percent(number("reference_error")?),
-        table(&["preset", "rays", "time", "error", "power"], &rows),
+        table(&["preset", "rays, M", "time", "error", "power"], &rows),
     );
     Ok(Section { title: "The paper's headline run", text, figures: Vec::new(), targets })
 }

@@ -22,7 +22,7 @@ pub const RAYS: u64 = 1 << 21;
 /// Rays of a turn of the solver.
 pub const SOLVER_RAYS: u64 = 10_000_000;
 /// Turns of every contestant.
-pub const TURNS: usize = 5;
+const TURNS: usize = 5;
 /// Scenes of the same triangles: the one with a polished floor, the other matte.
 pub const SCENES: [&str; 2] = ["hall", "hall-diffuse"];
 
@@ -129,7 +129,7 @@ fn describe(result: &Value) -> Result<Section, String> {
         "How fast rays find their nearest hit, and what of it is left when light is computed with them. The kernel runs alone over \
          the triangles of the scene with {} rays a turn: uniform points on the surfaces by area, cosine-distributed directions on the \
          front. *Sorted* rays are in blocks of {SORT_BLOCK} by direction octant, then along the Morton curve of their origins; the \
-         time to sort them is not counted, which makes the comparison harder for the solver, which sorts as well (sorting alone: \
+         time to sort them is not counted, which makes the comparison harder for the solver, since whatever it sorts it pays for (sorting alone: \
          {} Mray/s on two threads). The *whole solver* is the default preset from nothing to {} rays, warm start, selection, \
          deposits and all; *after a fifth* counts only what comes after the first fifth of the rays, when set-up and warm \
          start are over. Kernel and solver take turns ({turns} each, two threads); rates are medians, ratios medians of the ratios \

@@ -19,7 +19,8 @@ pub const PART: Part = Part { name: "memory", what: "bytes a patch and a triangl
 /// First argument of this program as its own child, which measures itself: `CHILD SCENE PATCHES`.
 pub const CHILD: &str = "--resident";
 
-const SCENE: &str = "hall-diffuse";
+/// Drawn with few triangles, so that drawing it is not the peak.
+const SCENE: &str = "cornell";
 /// The difference of two runs is free of what does not grow with patches.
 const PATCHES: [usize; 2] = [1_000_000, 4_000_000];
 const STAGES: [&str; 3] = ["scene", "solver", "solution"];

@@ -6,7 +6,7 @@ use twinray_validate::report::Figure;
 
 use super::{ALBEDO, ROOM_TARGET, SCENES, TARGETS};
 use crate::curve::{self, Crossing, Known, Point, crossing};
-use crate::document::{Section, Target, decades, digits, millions, percent, seconds, table, times};
+use crate::document::{Section, Target, decades, digits, millions, percent, seconds, share, table, times};
 use crate::results::Reader;
 
 /// The default preset needs so many times fewer rays than the paper's to this error; in other scenes never more.
@@ -20,6 +20,7 @@ const HALL: [(f64, f64); 2] = [(0.05, 2.5), (0.02, 16.0)];
 struct Curves<'a> {
     scene: &'a str,
     patches: f64,
+    reference_rays: f64,
     reference_error: f64,
     kernel_rate: f64,
     presets: Vec<(&'a str, Vec<Point>)>,
@@ -31,6 +32,7 @@ impl<'a> Curves<'a> {
         Ok(Self {
             scene: item.get("scene")?.text()?,
             patches: item.get("patches")?.number()?,
+            reference_rays: item.get("reference_rays")?.number()?,
             reference_error: item.get("reference_error")?.number()?,
             kernel_rate: item.get("kernel_rate")?.number()?,
             presets: item.get("curves")?.items()?.iter().map(preset).collect::<Result<_, String>>()?,
@@ -58,15 +60,16 @@ pub fn describe(result: &Value) -> Result<Section, String> {
     let text = format!(
         "The error is the relative RMS error over patches, √(ΣA ΔE²/ΣA E²) of luminance, emitters left out, as everywhere in this project. \
          *Paper* is `--preset paper` (one thread by nature), *default* the default preset, *forward only* the default with the deposit on \
-         the hit alone; all with one seed, on two threads. The reference is the mean of two default solves of 4 · 10⁷ rays with other seeds; its own \
+         the hit alone; all with one seed, on two threads. The reference is the mean of two default solves of together {} M rays with other seeds; its own \
          noise, known from their difference, is subtracted from the squares. Seconds are of the solver alone, from nothing, warm start \
          included; rays too. Values between two looks are interpolated in logarithms. **≈** marks what was not waited for: there the error is \
          carried on as rays^slope, with the slope of the last five looks, at the pace of the last two. ≤ marks errors that were reached \
          before the first look.\n\nRays, M:\n\n{}\n\nSeconds:\n\n{}\n\nHow many times more rays than the default, to {} (the measured \
          ratio scatters by some percent from seed to seed):\n\n{}\n\n{}",
+        millions(scenes.first().map_or(0.0, |c| c.reference_rays)),
         reached(&scenes, |c| millions(c.rays)),
         reached(&scenes, |c| digits(c.seconds)),
-        percent(AT),
+        share(AT),
         ratios(&scenes),
         closed_room(&room)?,
     );
@@ -79,7 +82,7 @@ fn targets(scenes: &[Curves]) -> Vec<Target> {
     for curves in scenes {
         let bound = if FEWER_SCENES.contains(&curves.scene) { FEWER } else { 1.0 };
         if let Some((ratio, note)) = curves.ratio("paper", "default", AT) {
-            let what = format!("{}: rays of the paper preset over the default's, to {}", curves.scene, percent(AT));
+            let what = format!("{}: rays of the paper preset over the default's, to {}", curves.scene, share(AT));
             targets.push(Target::at_least(what, bound, ratio, times).noted(note));
         }
     }
@@ -90,7 +93,7 @@ fn targets(scenes: &[Curves]) -> Vec<Target> {
                 let what = format!(
                     "{}: default preset to {} (kernel alone in this run: {rate} Mray/s)",
                     curves.scene,
-                    percent(error)
+                    share(error)
                 );
                 targets.push(Target::at_most(what, bound, c.seconds, seconds).noted(mark(c.known)));
             }
@@ -152,7 +155,7 @@ fn closed_room(room: &Reader) -> Result<String, String> {
          where the law says {}; the error over patches is {}.",
         number("patches")?,
         cells.join(", "),
-        percent(ROOM_TARGET),
+        share(ROOM_TARGET),
         digits(number("law_rays")?),
         millions(number("paper_rays")?),
         percent(number("paper_missing")?),
@@ -223,7 +226,7 @@ mod tests {
         );
         assert!(section.text.contains("after 5.5e16 iterations"), "{}", section.text);
         let target =
-            Target::at_least("cornell: rays of the paper preset over the default's, to 2.00 %".into(), 1.7, 4.0, times);
+            Target::at_least("cornell: rays of the paper preset over the default's, to 2 %".into(), 1.7, 4.0, times);
         assert_eq!(section.targets, [target.noted("≈ ")]);
         assert_eq!(section.figures.len(), 1);
     }
