@@ -7,7 +7,7 @@ use twinray::solve::{Params, state_bytes};
 use twinray_rays::Bvh;
 
 use super::{Effort, Outcome, Part};
-use crate::document::{Section, table};
+use crate::document::{Section, Target, table};
 use crate::origin::status_bytes;
 use crate::rays;
 use crate::results::Reader;
@@ -23,6 +23,13 @@ pub const CHILD: &str = "--resident";
 const SCENE: &str = "cornell";
 /// The difference of two runs is free of what does not grow with patches.
 const PATCHES: [usize; 2] = [1_000_000, 4_000_000];
+/// Most bytes of a triangle in the kernel, and of the solver's state of a diffuse and of a glossy patch.
+const TARGETS: [(&str, &str, f64); 3] = [
+    ("ray kernel: bytes a triangle", "bytes_per_triangle", 100.0),
+    ("solver's state: bytes a diffuse patch", "state_per_patch", 96.0),
+    ("solver's state: bytes a glossy patch", "state_per_glossy_patch", 136.0),
+];
+
 const STAGES: [&str; 3] = ["scene", "solver", "solution"];
 
 fn measure(effort: Effort) -> Result<Outcome, String> {
@@ -44,8 +51,9 @@ fn measure(effort: Effort) -> Result<Outcome, String> {
         "scene": SCENE,
         "bytes_per_triangle": kernel,
         "constants_per_patch": constants,
-        "state_per_patch": state_bytes(1, 0),
-        "state_per_glossy_patch": state_bytes(1, 1),
+        "state_per_patch": state_bytes(1, 0, false),
+        "state_per_glossy_patch": state_bytes(1, 1, false),
+        "state_per_observed_patch": state_bytes(1, 1, true),
         "runs": children,
     })))
 }
@@ -100,11 +108,13 @@ fn describe(result: &Value) -> Result<Section, String> {
         row("constants of the scene, a patch", number("constants_per_patch")?),
         row("state of the solver, a diffuse patch", number("state_per_patch")?),
         row("state of the solver, a glossy patch", number("state_per_glossy_patch")?),
+        row("the same with a fixed camera", number("state_per_observed_patch")?),
     ];
     let found =
         [row("scene built", peaks[0]), row("and solved", peaks[1]), row("and a snapshot of the light taken", peaks[2])];
     let text = format!(
-        "What the structures say of themselves (`twinray info` adds these up for a scene), bytes:\n\n{}\n\nWhat the process really took: its \
+        "What the structures say of themselves (`twinray info` adds these up for a scene; the lists of the rays of a \
+         wave are beside them), bytes:\n\n{}\n\nWhat the process really took: its \
          peak resident memory (`VmHWM`), measured in a child process on {} of {} and of {} patches, the difference over the difference \
          of the numbers of patches. Scratch memory that is already given back counts too. Bytes a patch:\n\n{}",
         table(&["", "bytes"], &said),
@@ -113,5 +123,9 @@ fn describe(result: &Value) -> Result<Section, String> {
         large.get("patches")?.number()?,
         table(&["peak after", "bytes a patch"], &found),
     );
-    Ok(Section { title: "Memory", text, figures: Vec::new(), targets: Vec::new() })
+    let target = |(what, key, bound): (&str, &str, f64)| {
+        Ok::<_, String>(Target::at_most(what.to_owned(), bound, number(key)?, |b| format!("{b:.0} B")))
+    };
+    let targets = TARGETS.into_iter().map(target).collect::<Result<_, _>>()?;
+    Ok(Section { title: "Memory", text, figures: Vec::new(), targets })
 }
