@@ -121,12 +121,9 @@ impl<'a> Solver<'a> {
     pub fn solution(&self) -> Solution {
         match &self.state {
             State::Sequential(s, _) => s.solution(self.scene, &self.glossy, &self.params),
-            State::Waves(w) => w.solution(Surroundings {
-                scene: self.scene,
-                glossy: &self.glossy,
-                params: &self.params,
-                lap: &|_| (),
-            }),
+            State::Waves(w) => {
+                w.solution(Surroundings { scene: self.scene, glossy: &self.glossy, params: &self.params, lap: &|_| () })
+            }
         }
     }
 }

@@ -223,8 +223,7 @@ impl WaveContext<'_> {
                     continue;
                 }
                 let d = transfer(self.estimator, &here, &there);
-                let (sky, escaped) =
-                    if shot.far == SKY { (d.on_shooter, d.on_hit) } else { (d.on_hit, d.on_shooter) };
+                let (sky, escaped) = if shot.far == SKY { (d.on_shooter, d.on_hit) } else { (d.on_hit, d.on_shooter) };
                 tally.sky += sky;
                 tally.escaped += escaped;
                 (d.on_hit, d.on_shooter)
