@@ -117,7 +117,8 @@ impl<'a> Frozen<'a> {
         self.start.emits && self.start.sources[patch.index()].emits()
     }
 
-    /// The largest deposit that one ray can leave: radiance over the smallest density beside it.
+    /// The largest deposit that one ray can leave: radiance over the smallest density beside it, which is the sum of what
+    /// the strategies give; any of them bounds it alone.
     ///
     /// A channel is at most 1/0.0722 of the luminance; a lobe's radiance may exceed its stand-in by the ratio of
     /// Fresnel terms, at most about 1/0.02.
@@ -125,12 +126,19 @@ impl<'a> Frozen<'a> {
         let channel = 14.0;
         let lobes = if self.stand_ins.is_empty() { 1.0 } else { 64.0 };
         let c = &self.coefficients;
-        let by_power = if c.per_power > 0.0 { channel * lobes / c.per_power } else { 0.0 };
+        let by_power = if c.per_power > 0.0 { 1.0 / c.per_power } else { f64::INFINITY };
+        let bounds = || {
+            // Lobes are brighter than the mean; rays by the lamps alone have a lamp at one end.
+            let extremes = Extremes::of(&self.start, self.stand_ins);
+            let by = |density: f64| if density > 0.0 { extremes.brightest / density } else { f64::INFINITY };
+            by(c.area).min(by(c.patches * extremes.least_gather)).min(by(c.per_lamp_power * extremes.dimmest_lamp))
+        };
+        let by_patches = channel * lobes * if by_power.is_finite() { by_power } else { bounds() };
         let by_sky = match self.start.scene.environment() {
             Some(e) if c.environment > 0.0 => channel * e.power().luminance() / c.environment,
             _ => 0.0,
         };
-        by_power.max(by_sky)
+        if by_patches.is_finite() { by_patches.max(by_sky) } else { by_sky }
     }
 
     /// What a patch sends towards `wo`, and the density with which rays start there.
@@ -329,6 +337,33 @@ impl<'a> Start<'a> {
     #[inline]
     fn directional(&self, patch: PatchId, k: usize) -> Option<Directional> {
         self.representatives[k].directional(self.scene, patch, self.representation)
+    }
+}
+
+/// What bounds deposits where no ray is shot by power. O(K).
+struct Extremes {
+    /// Largest luminance of a radiance, or of the mean radiance of a lobe.
+    brightest: f64,
+    least_gather: f64,
+    /// Smallest luminance of an emission.
+    dimmest_lamp: f64,
+}
+
+impl Extremes {
+    fn of(start: &Start, stand_ins: &[StandIn]) -> Self {
+        let mut this = Self { brightest: 0.0, least_gather: f64::INFINITY, dimmest_lamp: f64::INFINITY };
+        for (i, source) in start.sources.iter().enumerate() {
+            this.brightest = this.brightest.max(source.radiance().luminance());
+            this.least_gather = this.least_gather.min(source.gather());
+            if source.emits() {
+                let emitted = start.scene.emission(PatchId(i as u32)).luminance();
+                this.dimmest_lamp = this.dimmest_lamp.min(emitted);
+            }
+        }
+        for s in stand_ins {
+            this.brightest = this.brightest.max(f64::from(s.cosine) + f64::from(s.lobe));
+        }
+        this
     }
 }
 

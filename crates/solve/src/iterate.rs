@@ -13,6 +13,7 @@ use crate::replicas::Replicas;
 use crate::sequential::Sequential;
 use crate::solution::Solution;
 use crate::stage::Stage;
+use crate::strategies::Shares;
 use crate::wave::close;
 use crate::waves::Surroundings;
 
@@ -41,13 +42,16 @@ impl<'a> Solver<'a> {
     /// # Errors
     /// If nothing emits, or a setting is out of range.
     pub fn new(scene: &'a PatchScene, params: Params, observer: Option<Observer>) -> Result<Self, SolveError> {
-        let fraction = |name, value: f64| match (0.0..1.0).contains(&value) {
-            true => Ok(()),
-            false => Err(SolveError::Setting { name, value, expected: "at least 0 and less than 1" }),
-        };
-        fraction("gather share", params.gather_share)?;
-        fraction("environment share", params.environment_share)?;
-        fraction("sum of the shares", params.gather_share + params.environment_share)?;
+        if let Some(shares) = params.shares {
+            let expected = "at least 0, and all of them 1 together";
+            let sum: f64 = shares.to_array().iter().sum();
+            if let Some(value) = shares.to_array().into_iter().find(|s| !(0.0..=1.0).contains(s)) {
+                return Err(SolveError::Setting { name: "share of a strategy", value, expected });
+            }
+            if !((sum - 1.0).abs() < 1e-9) {
+                return Err(SolveError::Setting { name: "sum of the shares", value: sum, expected });
+            }
+        }
         if !(0.0..=1e6).contains(&params.warm_start) {
             let expected = "0 to 1000000 rays per patch";
             return Err(SolveError::Setting { name: "warm start", value: params.warm_start, expected });
@@ -106,6 +110,15 @@ impl<'a> Solver<'a> {
         match &self.state {
             State::Sequential(s, _) => Some(s.power()),
             State::Waves(_) => None,
+        }
+    }
+
+    /// Shares of the strategies by which rays find their starts at this moment, of the first replica; `None` for the
+    /// paper's schedule, which knows one strategy.
+    pub fn shares(&self) -> Option<Shares> {
+        match &self.state {
+            State::Sequential(..) => None,
+            State::Waves(w) => Some(w.shares()),
         }
     }
 

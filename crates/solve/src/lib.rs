@@ -44,4 +44,5 @@ pub use params::{Estimator, Params, Representation, Schedule, SolveError};
 pub use patch_light::PatchLight;
 pub use solution::{PowerBalance, Solution};
 pub use stage::Stage;
+pub use strategies::Shares;
 pub use tally::Tally;

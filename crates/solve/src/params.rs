@@ -1,5 +1,7 @@
 //! Every knob of the solver, with its default and its place in the paper; the presets.
 
+use crate::strategies::Shares;
+
 /// How a ray's two transfers are estimated (paper §1 and §2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Estimator {
@@ -51,11 +53,9 @@ pub struct Params {
     pub representation: Representation,
     /// Grouping and averaging.
     pub schedule: Schedule,
-    /// β, the share of rays that start evenly instead of by power, half of them by area and half by number of patches
-    /// (waves only): 2–3 % more error in bright places for a fifth less in dark ones. At least .35 under a sky.
-    pub gather_share: f64,
-    /// Share of rays that start from the environment, where there is one (waves only).
-    pub environment_share: f64,
+    /// Shares of the strategies by which rays find their starts (waves only); `None` fits them to the scene, epoch by
+    /// epoch.
+    pub shares: Option<Shares>,
     /// Rays per patch of the warm start (waves only); 0 starts from the emission alone.
     pub warm_start: f64,
 }
@@ -68,8 +68,7 @@ impl Params {
             estimator: Estimator::Balance,
             representation: Representation::Both,
             schedule: Schedule::Waves,
-            gather_share: 0.1,
-            environment_share: 0.3,
+            shares: None,
             warm_start: 4.0,
         }
     }
@@ -78,7 +77,7 @@ impl Params {
     pub fn paper_preset(seed: u64) -> Self {
         Self {
             schedule: Schedule::Paper { batch: 1 },
-            gather_share: 0.0,
+            shares: Some(Shares::POWER),
             warm_start: 0.0,
             ..Self::default_preset(seed)
         }

@@ -12,6 +12,7 @@ use twinray_scene::{PatchId, PatchScene, Rgb};
 use crate::error_bars::{Evidence, Noise, PatchNoise};
 use crate::params::Representation;
 use crate::solution::{GlossySolution, Solution};
+use crate::strategies::Shares;
 use crate::tally::Tally;
 use crate::wave::OutputState;
 use crate::waves::{Surroundings, Waves, Workspace, balance};
@@ -41,6 +42,11 @@ impl Replicas {
     /// Rays of both.
     pub(crate) fn rays(&self) -> u64 {
         self.runs.iter().map(Waves::rays).sum()
+    }
+
+    /// Shares of the first one's strategies.
+    pub(crate) fn shares(&self) -> Shares {
+        self.runs[0].shares()
     }
 
     /// One wave each.

@@ -22,7 +22,7 @@ use crate::params::{Estimator, Params};
 use crate::solution::PowerBalance;
 use crate::source::{PackedRepresentative, Source};
 use crate::stage::{Lap, Stage};
-use crate::strategies::Shares;
+use crate::strategies::{Fit, Known, Shares};
 use crate::tally::Tally;
 use crate::wave::{Closing, OutputState, SourceState, Update, Wave, WaveContext};
 
@@ -43,6 +43,9 @@ pub(crate) struct Workspace {
     tables: FrozenTables,
     wave: Wave,
 }
+
+/// Shares are fitted anew whenever the rays have grown by one part in so many.
+const EPOCH: u64 = 4;
 
 /// What all waves of all runs share.
 #[derive(Clone, Copy)]
@@ -73,6 +76,10 @@ pub(crate) struct Waves {
     /// 𝓛 of the power that patches emit, W.
     lamp_power: f64,
     shares: Shares,
+    /// Witnesses of this epoch, and the n at which it ends.
+    fit: Fit,
+    epoch: u64,
+    known: Known,
     source_weight: f64,
     output_weight: f64,
     source: SourceState,
@@ -100,7 +107,10 @@ impl Waves {
             forgetting,
             total_area: scene.total_area(),
             lamp_power: scene.emitted_power().luminance(),
-            shares: Shares::first(around.params, scene.environment().is_some()),
+            shares: around.params.shares.unwrap_or_else(|| Shares::first(scene.environment().is_some())),
+            fit: Fit::default(),
+            epoch: 0,
+            known: Known::default(),
             source_weight: 0.0,
             output_weight: 0.0,
             source: SourceState { sources: emitters(scene), representatives: Vec::new() },
@@ -155,13 +165,23 @@ impl Waves {
     /// One wave.
     pub(crate) fn advance(&mut self, around: Surroundings, output: &mut OutputState, workspace: &mut Workspace) {
         let size = self.wave_size(around.scene.len());
+        // The one-sided estimators divide by other densities than witnesses tell of.
+        let fitted = around.params.shares.is_none() && around.params.estimator == Estimator::Balance;
+        let weight = 2.0 * self.output_weight.max(1.0);
+        if fitted && self.n >= self.epoch {
+            self.shares = self.fit.step(self.shares);
+            self.fit = Fit::default();
+            self.epoch = self.n + self.n / EPOCH;
+            self.known = Known::new(around.scene, &output.deposits, weight);
+        }
+        let witness = if fitted { self.known.witness(around.scene, &output.deposits, weight) } else { None };
         let Workspace { tables, wave } = workspace;
         let start = self.start(around, &self.source.sources, true);
         let frozen = Frozen::new(start, self.shares, tables);
         (around.lap)(Stage::Freeze);
         let units = Units::new(frozen.largest_deposit(), 2 * size);
         let context = self.context(around, self.seed);
-        let (mut tally, _) = context.shoot(&frozen, &self.sobol, self.n, size, None, wave);
+        let (mut tally, fit) = context.shoot(&frozen, &self.sobol, self.n, size, witness.as_ref(), wave);
 
         let weight = libm::pow(self.n as f64 + 0.5 * size as f64, self.forgetting) * size as f64;
         self.source_weight += weight;
@@ -181,6 +201,12 @@ impl Waves {
         self.output_weight += size as f64;
         self.n += size;
         self.wave += 1;
+        self.fit.add(&fit);
+    }
+
+    /// Shares of the strategies at this moment.
+    pub(crate) fn shares(&self) -> Shares {
+        self.shares
     }
 
     fn start<'a>(&'a self, around: Surroundings<'a>, sources: &'a [Source], emits: bool) -> Start<'a> {
@@ -230,9 +256,10 @@ impl Waves {
         // Enter the estimate D₀ as if `planned` rays had each left it: unbiased, and weighted like a first wave.
         let n0 = planned as f64;
         let quantum = Quantum::Power { sky: pilot.sky, quantum: pilot.total / n0 };
-        self.shoot_around(around, output, workspace, quantum, 1 << 32, n0);
+        let weight = n0 * power_shot_weight(around.scene);
+        self.shoot_around(around, output, workspace, quantum, 1 << 32, weight);
         self.source_weight = libm::pow(n0, self.forgetting + 1.0) / (self.forgetting + 1.0);
-        self.output_weight = n0;
+        self.output_weight = weight;
         self.n = planned;
     }
 
@@ -257,10 +284,13 @@ impl Waves {
         let mut first = 0.0;
         for step in 0.. {
             let shares = match (step, scene.environment()) {
-                (0, Some(_)) => Shares::of(0.3, 0.3),
+                (0, Some(_)) => Shares::even(0.3, 0.3),
                 // The one-sided estimators find light only from where they start: start everywhere.
-                _ if matches!(around.params.estimator, Estimator::Backward | Estimator::Equal) => Shares::of(0.5, 0.0),
-                _ => Shares::of(0.0, 0.0),
+                _ if matches!(around.params.estimator, Estimator::Backward | Estimator::Equal) => {
+                    Shares::even(0.5, 0.0)
+                }
+                // By power alone every ray carries the whole power, and the light of many bounces is sure.
+                _ => Shares::POWER,
             };
             let frozen = Frozen::new(self.start(around, &unshot, step == 0), shares, tables);
             (around.lap)(Stage::Freeze);
@@ -326,6 +356,15 @@ impl Waves {
         }
         Shot { total, sky }
     }
+}
+
+/// What a ray of the warm start counts for in the output against one of a wave. Shot by power alone, it finds patches in
+/// proportion to their area, and mean squares of relative errors grow with the mean of A times that of 1/A; those of
+/// fitted shares about with its root. The best weights are as one over the variances.
+fn power_shot_weight(scene: &PatchScene) -> f64 {
+    let inverse: f64 = scene.patches().map(|p| 1.0 / scene.area(p)).sum();
+    let patches = scene.len() as f64;
+    1.0 / (scene.total_area() * inverse).sqrt() * patches
 }
 
 /// Sources before any light was reflected.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use twinray::scene::{
     Environment, Instance, Material, Mesh, PatchBudget, PatchOptions, PatchScene, Rgb, Scene, Surface, Texel,
 };
-use twinray::solve::{Params, PowerBalance, Solution, Solver};
+use twinray::solve::{Params, PowerBalance, Shares, Solution, Solver};
 
 use crate::factors::Range;
 
@@ -233,7 +233,7 @@ pub fn replicas<T: Send>(
 ///
 /// Without a warm start the first wave knows emission (and sky) only: see [`unreflected_share`].
 pub fn sensor_params(seed: u64) -> Params {
-    Params { gather_share: 0.9, environment_share: 0.05, warm_start: 0.0, ..Params::default_preset(seed) }
+    Params { shares: Some(Shares::even(0.9, 0.05)), warm_start: 0.0, ..Params::default_preset(seed) }
 }
 
 /// Share of the light of one reflection that is missing after `rays` rays with [`sensor_params`]: a solve is two

@@ -13,6 +13,7 @@ mod mesh;
 mod plates;
 #[cfg(test)]
 mod tests;
+mod uneven;
 
 pub use cornell::cornell;
 pub use cube::cube;
@@ -20,6 +21,7 @@ pub use doorway::doorway;
 pub use furnace::furnace;
 pub use hall::{hall, hall_with};
 pub use plates::plates;
+pub use uneven::uneven;
 
 use crate::authored::Scene;
 
@@ -33,6 +35,8 @@ pub const NAMES: &[(&str, &str)] = &[
     ("doorway", "a dark room, lit through a door by the lamp of the next one"),
     ("hall", "a hall with columns, a gallery, stairs and a polished stone floor"),
     ("hall-diffuse", "the hall with a matte floor"),
+    ("uneven", "a room of few large and many tiny triangles, areas from square metres to square millimetres"),
+    ("uneven-glowing", "the uneven room without a lamp: its walls glow"),
 ];
 
 /// The built-in scene called `name`, one of `NAMES`.
@@ -46,6 +50,8 @@ pub fn by_name(name: &str) -> Option<Scene> {
         "doorway" => doorway(),
         "hall" => hall(),
         "hall-diffuse" => hall_with(false),
+        "uneven" => uneven(false),
+        "uneven-glowing" => uneven(true),
         _ => return None,
     };
     Some(scene)

@@ -16,6 +16,7 @@ const CLOSED: &[(&str, Option<f64>)] = &[
     ("cornell-closed", None),
     ("doorway", None),
     ("hall", None),
+    ("uneven", Some(4.0 * 2.6 * 5.0)),
 ];
 
 fn scene(name: &str) -> Scene {

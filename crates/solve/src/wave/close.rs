@@ -374,24 +374,24 @@ impl Part<'_> {
         reflected: Rgb,
     ) {
         let per_area = 1.0 / (PI * context.scene.area(patch));
+        let emitted = context.scene.emission(patch);
+        // The sample alone stands for all reflected light, once there is one.
+        let sample = context.representation == Representation::Sample
+            && number.is_some_and(|k| self.representatives[k].is_there());
         let source = &mut self.sources[i];
-        match closing.update {
+        let now = source.radiance();
+        let next = match closing.update {
             Update::Blend(fraction) => {
-                let emitted = context.scene.emission(patch);
-                // The sample alone stands for all reflected light, once there is one.
-                let sample = context.representation == Representation::Sample
-                    && number.is_some_and(|k| self.representatives[k].is_there());
-                let now = source.radiance();
                 let mean = emitted + reflected * (per_area / closing.rays as f64);
-                let next = if sample { emitted } else { now + (mean - now) * fraction };
-                source.constant = next.to_f32();
+                now + (mean - now) * fraction
             }
             Update::Step(per) => {
-                let next = reflected * (per_area * per);
-                source.constant = (source.radiance() + next).to_f32();
-                self.unshot[i].constant = next.to_f32();
+                let sent_on = reflected * (per_area * per);
+                self.unshot[i].constant = sent_on.to_f32();
+                now + sent_on
             }
-        }
+        };
+        source.constant = if sample { emitted } else { next }.to_f32();
     }
 }
 

@@ -4,7 +4,7 @@
 //! arrives has been reflected once by the lit wall, and there is nothing else that reflects.
 
 use glam::DVec3;
-use twinray::solve::Params;
+use twinray::solve::{Params, Shares};
 
 use crate::analytic::closed_room;
 use crate::case::{Case, Effort, Row};
@@ -72,7 +72,7 @@ fn rows(effort: Effort, obstacle: Option<Rectangle>) -> Vec<Row> {
         group
     });
     let rays = effort.rays(1 << 22);
-    let measured = rig.measure(&Params { gather_share: 0.6, ..sensor_params(1100) }, rays);
+    let measured = rig.measure(&Params { shares: Some(Shares::even(0.6, 0.05)), ..sensor_params(1100) }, rays);
     // The solver's wall has one illuminance per patch: the difference from a wall of a quarter of the cell size is more
     // than what it misses.
     let (as_cut, smooth) = (lit_cells([16, 12]), lit_cells([32, 24]));

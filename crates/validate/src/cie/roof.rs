@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use twinray::solve::Params;
+use twinray::solve::{Params, Shares};
 
 use crate::case::{Case, Effort, Row};
 use crate::factors::point_to_polygon;
@@ -44,7 +44,7 @@ pub fn flux(effort: Effort) -> Case {
         let opening = room(&mut rig, walls, black, a);
         rig.sky(SKY);
         // Without reflection there is nothing that a warm start could know.
-        let params = Params { warm_start: 0.0, gather_share: 0.6, ..Params::default_preset(1300) };
+        let params = Params { warm_start: 0.0, shares: Some(Shares::even(0.6, 0.3)), ..Params::default_preset(1300) };
         let measured = rig.measure(&params, effort.rays(1 << 20));
         let area = rig.areas()[walls];
         let flux: Vec<f64> = measured[walls].iter().map(|e| e * area).collect();
