@@ -21,7 +21,7 @@ use crate::transfer::Endpoint;
 /// Patches of one entry of the table.
 const BLOCK: usize = 4;
 /// Patches of one parallel task: a multiple of [`BLOCK`].
-const TASK: usize = 1 << 14;
+const TASK: usize = 1 << 12;
 
 /// Bytes of the table per patch.
 pub(crate) const BYTES_PER_PATCH: usize = size_of::<f64>() / BLOCK;
@@ -203,7 +203,6 @@ impl<'a> Frozen<'a> {
     /// Probability with which a patch is chosen, but for the rounding of all of them.
     #[inline]
     fn weight(&self, patch: PatchId) -> f64 {
-        let area = self.start.scene.area(patch);
         let source = &self.start.sources[patch.index()];
         let (cosine, lobe) = match self.start.representatives {
             [] => (source.radiance().luminance(), 0.0),
@@ -212,7 +211,9 @@ impl<'a> Frozen<'a> {
                 None => (source.radiance().luminance(), 0.0),
             },
         };
-        area * (PI * self.cosine_density(patch, source, cosine) + self.coefficients.per_power * lobe)
+        let radiosity = PI * self.cosine_density(patch, source, cosine) + self.coefficients.per_power * lobe;
+        // Late in the warm start most patches have nothing left to send: their area need not be looked up.
+        if radiosity == 0.0 { 0.0 } else { radiosity * self.start.scene.area(patch) }
     }
 
     fn block(&self, block: usize) -> impl Iterator<Item = PatchId> + use<> {
@@ -390,7 +391,7 @@ fn fill_stand_ins(start: &Start, stand_ins: &mut Vec<StandIn>) -> f64 {
             Some(k) => PI * f64::from(stand_ins[k].cosine) + f64::from(stand_ins[k].lobe),
             None => PI * source.radiance().luminance(),
         };
-        radiosity * start.scene.area(patch)
+        if radiosity == 0.0 { 0.0 } else { radiosity * start.scene.area(patch) }
     };
     // Chunks in order: floating-point sums must not depend on the number of threads.
     let chunk = |(c, sources): (usize, &[Source])| (TASK * c..).zip(sources).map(|(i, s)| power(i, s)).sum::<f64>();

@@ -20,12 +20,14 @@ pub(super) struct Table {
 
 impl Table {
     fn build(f: impl Fn(f64, f64) -> f64) -> Self {
-        let node = |i: usize, n: usize| (i as f64 / (n - 1) as f64).powi(2);
-        let values = (0..WIDTHS)
-            .flat_map(|w| (0..COSINES).map(move |c| (node(c, COSINES), node(w, WIDTHS))))
-            .map(|(cosine, width)| f(cosine.max(1e-4), width))
-            .collect();
+        let values = nodes().map(|(cosine, width)| f(cosine, width)).collect();
         Self { values }
+    }
+
+    /// Two functions that are computed together.
+    fn build_two(f: impl Fn(f64, f64) -> (f64, f64)) -> [Self; 2] {
+        let (first, second) = nodes().map(|(cosine, width)| f(cosine, width)).unzip();
+        [first, second].map(|values| Self { values })
     }
 
     /// Interpolated value.
@@ -43,6 +45,12 @@ impl Table {
         let (a, b) = (row(w), row(w + 1));
         a + (b - a) * fw
     }
+}
+
+/// (cosine, width) of a table's entries, in order.
+fn nodes() -> impl Iterator<Item = (f64, f64)> {
+    let node = |i: usize, n: usize| (i as f64 / (n - 1) as f64).powi(2);
+    (0..WIDTHS).flat_map(move |w| (0..COSINES).map(move |c| (node(c, COSINES).max(1e-4), node(w, WIDTHS))))
 }
 
 /// The GGX lobe's directional albedo for Schlick's Fresnel term: F0·scale + F90·bias ("split sum", Karis 2013),
@@ -66,10 +74,10 @@ fn unit_square() -> impl Iterator<Item = [f64; 2]> {
 pub(super) fn ggx() -> &'static GgxTables {
     static TABLES: OnceLock<GgxTables> = OnceLock::new();
     TABLES.get_or_init(|| {
-        let entry = |cosine: f64, alpha: f64, part: fn(f64) -> f64| {
+        let entry = |cosine: f64, alpha: f64| {
             let alpha = alpha.max(1e-3);
             let wi = DVec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
-            let sum: f64 = unit_square()
+            let (scale, bias) = unit_square()
                 .map(|[s, v]| {
                     // The far tail of the distribution, a share of about α², is what is lost below the horizon. It
                     // lies at the end of the unit interval, so that is where the points crowd: u = 1 − (1 − s)³.
@@ -77,15 +85,16 @@ pub(super) fn ggx() -> &'static GgxTables {
                     let h = ggx::visible_normal(wi, alpha, [u, v]);
                     let wo = 2.0 * wi.dot(h) * h - wi;
                     if wo.z <= 0.0 {
-                        return 0.0;
+                        return (0.0, 0.0);
                     }
-                    weight * ggx::masking_ratio(wi.z, wo.z, alpha) * part(schlick(wi.dot(h)))
+                    let (lobe, fresnel) = (weight * ggx::masking_ratio(wi.z, wo.z, alpha), schlick(wi.dot(h)));
+                    (lobe * (1.0 - fresnel), lobe * fresnel)
                 })
-                .sum();
-            sum / (QUADRATURE * QUADRATURE) as f64
+                .fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
+            let points = (QUADRATURE * QUADRATURE) as f64;
+            (scale / points, bias / points)
         };
-        let scale = Table::build(|c, a| entry(c, a, |f| 1.0 - f));
-        let bias = Table::build(|c, a| entry(c, a, |f| f));
+        let [scale, bias] = Table::build_two(entry);
         let mean = |table: &Table, a: f64| {
             let n = 64;
             (0..n).map(|i| table.at((1.0 - (i as f64 + 0.5) / n as f64).sqrt(), a)).sum::<f64>() / n as f64

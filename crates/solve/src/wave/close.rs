@@ -300,6 +300,11 @@ impl Part<'_> {
         let mut closed = Closed::default();
         for (i, sum) in sums.patches.iter().enumerate() {
             let patch = PatchId((self.first + i) as u32);
+            // Late in the warm start most patches get nothing: nothing need be looked up.
+            if sum.hits == 0 && matches!(closing.update, Update::Step(_)) {
+                self.unshot[i].constant = [0.0; 3];
+                continue;
+            }
             let arrived = sum.deposits.value(units.deposit);
             let number = context.glossy.number_of(patch).map(|k| k - self.first_glossy);
             let reflected = match number {
