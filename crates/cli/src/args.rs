@@ -8,7 +8,8 @@ use clap::{Parser, Subcommand, ValueEnum};
 #[derive(Debug, Parser)]
 #[command(name = "twinray", version, about, arg_required_else_help = true)]
 #[command(after_help = "SCENE is a .glb, .gltf or .obj file, or a built-in scene: \
-    furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse.\n\
+    furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse, \
+    uneven, uneven-glowing.\n\
     Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 interrupted with the result kept.")]
 pub struct Args {
     /// What to do.

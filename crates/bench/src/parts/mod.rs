@@ -9,6 +9,8 @@ mod headline;
 mod kernel;
 pub mod memory;
 mod scaling;
+mod stages;
+mod strategies;
 mod threads;
 
 use serde_json::Value;
@@ -16,8 +18,17 @@ use serde_json::Value;
 use crate::document::Section;
 
 /// In the order of the document.
-pub const PARTS: &[Part] =
-    &[kernel::PART, embree::PART, threads::PART, scaling::PART, convergence::PART, headline::PART, memory::PART];
+pub const PARTS: &[Part] = &[
+    kernel::PART,
+    embree::PART,
+    stages::PART,
+    threads::PART,
+    scaling::PART,
+    convergence::PART,
+    strategies::PART,
+    headline::PART,
+    memory::PART,
+];
 
 /// Something that is measured, and said.
 pub struct Part {

@@ -2,7 +2,18 @@
 
 use crate::support::{Place, shows_something, warnings};
 
-const NAMES: [&str; 8] = ["furnace", "plates", "cube", "cornell", "cornell-closed", "doorway", "hall", "hall-diffuse"];
+const NAMES: [&str; 10] = [
+    "furnace",
+    "plates",
+    "cube",
+    "cornell",
+    "cornell-closed",
+    "doorway",
+    "hall",
+    "hall-diffuse",
+    "uneven",
+    "uneven-glowing",
+];
 
 #[test]
 fn the_list_and_the_help_name_them_all() {

@@ -41,8 +41,9 @@ fn solutions_are_compared_by_patch_with_their_error_bars() {
     // The square of some 1000 patches, of which bright ones count for more, has a deviation of about 10 %, its root
     // of 5 %: four of them.
     assert!((rms / expected - 1.0).abs() < 0.2, "{rms} against {expected}");
-    // √((1 − 2/π)/1000) = .019: four of them.
-    assert!((number(&found["z"]["mean_abs"]) - 0.798).abs() < 0.076, "{}", found["z"]);
+    // √((1 − 2/π)/1000) = .019, and bars that were themselves scaled by a mean of 1000 squares, ½√(2/1000) = 2.2 % of
+    // .798 = .018: together .026, and four of them.
+    assert!((number(&found["z"]["mean_abs"]) - 0.798).abs() < 0.105, "{}", found["z"]);
     assert!(number(&found["bias"]).abs() < 0.02, "{found:#}");
     assert_eq!(found["worst_by_z"].as_array().unwrap().len(), 10);
     assert_eq!(found["equal"], false);
