@@ -105,7 +105,7 @@ impl PatchScene {
         let (from, to) = (self.lifted(a, normal_a), self.lifted(b, normal_b));
         let d = to - from;
         let ray = Ray { t_max: 1.0, ..kernel_ray(from, d, NO_TRIANGLE) };
-        if self.has_holes() {
+        if self.holes {
             self.kernel.closest_hit_where(&ray, |h| self.accept(h)).is_none()
         } else {
             !self.kernel.occluded(&ray)
@@ -115,16 +115,12 @@ impl PatchScene {
     #[inline]
     fn closest(&self, origin: DVec3, direction: DVec3, skip: u32) -> Option<SurfaceHit> {
         let ray = kernel_ray(origin, direction, skip);
-        let hit = if self.has_holes() {
+        let hit = if self.holes {
             self.kernel.closest_hit_where(&ray, |h| self.accept(h))
         } else {
             self.kernel.closest_hit(&ray)
         }?;
         Some(surface_hit(&hit))
-    }
-
-    fn has_holes(&self) -> bool {
-        self.materials.iter().any(|m| m.opacity != Opacity::Opaque)
     }
 
     fn accept(&self, hit: &Hit) -> bool {

@@ -124,6 +124,8 @@ pub struct PatchScene {
     pub(crate) materials: Vec<Material>,
     pub(crate) images: Vec<Arc<TextureImage>>,
     pub(crate) kernel: twinray_rays::Bvh,
+    /// Whether any material has holes, which rays must ask about.
+    pub(crate) holes: bool,
     pub(crate) environment: Option<EnvironmentLight>,
     /// Per patch: triangle × 2 + side.
     owner: Vec<u32>,
@@ -221,6 +223,7 @@ impl PatchScene {
             materials: scene.materials.clone(),
             images: scene.images.clone(),
             kernel: twinray_rays::Bvh::build(&kernel_input),
+            holes: scene.materials.iter().any(|m| m.opacity != Opacity::Opaque),
             environment: scene.environment.clone().map(|e| EnvironmentLight::new(e, radius)),
             owner,
             base_color: Vec::new(),
@@ -511,7 +514,7 @@ impl PatchScene {
     fn average_materials(&mut self) {
         let means: Vec<TriangleMeans> =
             (0..self.triangles.len() as u32).into_par_iter().map(|i| self.triangle_means(i)).collect();
-        let holes = self.materials.iter().any(|m| m.opacity != Opacity::Opaque);
+        let holes = self.holes;
         let emits = self.materials.iter().any(|m| !m.emission.is_black());
         for (t, means) in self.triangles.iter_mut().zip(means) {
             (t.metallic, t.roughness) = (means.metallic, means.roughness);

@@ -18,7 +18,7 @@ const CUTS: u32 = 8;
 const SMALLER_SIDE: f64 = 0.196;
 
 /// A closed room of 4 × 2.6 × 5 m, albedo 0.5, lit by a lamp of 1 × 1 m in its ceiling, or `glowing` by itself like walls
-/// that only send on what they got; one patch a triangle, unless a budget cuts further.
+/// that only send on what they got (a furnace, of radiosity 2π everywhere); one patch a triangle, unless a budget cuts further.
 pub fn uneven(glowing: bool) -> Scene {
     let mut builder = Builder::new(if glowing { "uneven-glowing" } else { "uneven" });
     let (wall, lamp) = if glowing { (1.0, 1.0) } else { (0.0, 20.0) };
@@ -46,7 +46,7 @@ pub fn uneven(glowing: bool) -> Scene {
     builder.polygon(lamp, &corners(ceiling, [x0, z0, x1, z1]));
 
     let camera = Camera::look_at("main", DVec3::new(3.6, 1.6, 4.6), DVec3::new(0.6, 1.0, 0.0), DVec3::Y, 70.0);
-    let mut scene = builder.finish(vec![camera]);
+    let mut scene = builder.finish(vec![Camera { aspect: Some(4.0 / 3.0), ..camera }]);
     scene.suggested_patches = Some(1);
     scene
 }
