@@ -1,7 +1,7 @@
 //! Memory layout of the tree: eight-wide inner nodes and leaves of up to eight triangles, both as
 //! arrays of eight lanes.
 //!
-//! No algorithm lives here; `build` writes these types, `lanes`, `avx2` and `triangle` read them.
+//! No algorithm lives here; `build` writes these types, `lanes`, `wide` and `triangle` read them.
 
 /// Lanes of every vector operation: the children of an inner node and the triangles of a leaf.
 /// Eight floats fill one AVX register; wider would leave more lanes empty than it saves steps.
