@@ -8,9 +8,9 @@
 pub(crate) const LANES: usize = 8;
 
 /// Eight child boxes, structure of arrays. Unused lanes hold an inverted infinite box, which no ray
-/// meets.
+/// meets. Aligned to cache lines: the rest of the last one costs less than to touch one line more.
 #[derive(Clone, Debug, PartialEq)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(crate) struct Node {
     /// `[plane][lane]`, planes in the order low x, y, z, high x, y, z.
     pub planes: [[f32; LANES]; 6],
@@ -55,7 +55,7 @@ impl Child {
 /// A leaf: up to eight triangles, vertices in canonical order (see `triangle`). Unused lanes hold
 /// NaN, which fails every comparison.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(crate) struct Leaf {
     /// `[vertex][axis][lane]`.
     pub vertices: [[[f32; LANES]; 3]; 3],
