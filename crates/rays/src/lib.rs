@@ -22,13 +22,16 @@
 //! assert_eq!((hit.u, hit.v), (0.25, 0.5));
 //! ```
 //!
-//! Code map: [`Bvh`] in `bvh`, construction in `build`, memory layout in `node`, per-ray constants
+//! Code map: [`Bvh`] in `bvh`, construction in `build` (`binary`, then `collapse`),
+//! memory layout in `node`, per-ray constants
 //! in `ray`, the walk in `traverse`, the eight-lane tests in `lanes` (portable, the oracle) and
 //! `wide` (AVX2 and AVX-512), the exact single-triangle test in `triangle`.
 
+mod binary;
 mod bounds;
 mod build;
 mod bvh;
+mod collapse;
 mod lanes;
 mod node;
 mod ray;

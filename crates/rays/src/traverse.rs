@@ -10,8 +10,8 @@ use crate::node::{Child, LANES, Leaf, Node};
 use crate::ray::{FAR_SLACK, Hit, PreparedRay};
 use crate::triangle::meet;
 
-/// Most levels of inner nodes; `build` keeps to it.
-pub(crate) const MAX_DEPTH: usize = 40;
+/// Most levels of inner nodes; `binary` keeps to it. The stack stays within a page of memory.
+pub(crate) const MAX_DEPTH: usize = 64;
 
 /// The hit that beats all others among those that `accept` takes.
 #[inline(always)]
