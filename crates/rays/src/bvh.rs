@@ -3,13 +3,13 @@
 //! Construction is in `build`, the walk in `traverse`; here the public calls are checked, prepared
 //! and sent to the widest code this processor runs.
 
-#[cfg(target_arch = "x86_64")]
-use crate::avx2::Avx2;
 use crate::build;
 use crate::lanes::{Lanes, Portable};
 use crate::node::{Label, Leaf, Node};
 use crate::ray::{Hit, PreparedRay, Ray};
 use crate::traverse;
+#[cfg(target_arch = "x86_64")]
+use crate::wide::{Avx2, Avx512};
 
 /// Triangles, ready to be met by rays: a tree of bounding boxes with eight children a node and up
 /// to eight triangles a leaf.
@@ -23,6 +23,7 @@ pub struct Bvh {
     bounds: Option<[[f32; 3]; 2]>,
     triangle_count: usize,
     left_out: usize,
+    instructions: Instructions,
 }
 
 impl Bvh {
@@ -44,6 +45,7 @@ impl Bvh {
             bounds: tree.bounds,
             triangle_count: triangles.len(),
             left_out: tree.left_out,
+            instructions: Instructions::widest(),
         }
     }
 
@@ -58,31 +60,30 @@ impl Bvh {
     /// `accept` is asked, in no particular order, about any hit that would win so far; it should
     /// depend on the hit alone.
     pub fn closest_hit_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        let ray = PreparedRay::new(ray, self.bounds.as_ref()?)?;
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: AVX2 has just been detected.
+        match self.instructions {
+            // SAFETY: `Instructions::widest` has detected them.
+            #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
-            return unsafe { closest_avx2(self, &ray, accept) };
+            Instructions::Avx512 => unsafe { Avx512::closest(self, ray, accept) },
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            Instructions::Avx2 => unsafe { Avx2::closest(self, ray, accept) },
+            Instructions::Portable => self.closest::<Portable>(&self.prepare(ray)?, accept),
         }
-        self.closest::<Portable>(&ray, accept)
     }
 
     /// Whether `ray` hits anything, which is found sooner than what it hits first.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let Some(bounds) = &self.bounds else {
-            return false;
-        };
-        let Some(ray) = PreparedRay::new(ray, bounds) else {
-            return false;
-        };
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: AVX2 has just been detected.
+        match self.instructions {
+            // SAFETY: `Instructions::widest` has detected them.
+            #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
-            return unsafe { any_avx2(self, &ray) };
+            Instructions::Avx512 => unsafe { Avx512::any(self, ray) },
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            Instructions::Avx2 => unsafe { Avx2::any(self, ray) },
+            Instructions::Portable => self.prepare(ray).is_some_and(|ray| self.any::<Portable>(&ray)),
         }
-        self.any::<Portable>(&ray)
     }
 
     /// Memory of the tree in bytes, the triangles in it included.
@@ -107,6 +108,11 @@ impl Bvh {
     }
 
     #[inline(always)]
+    pub(crate) fn prepare(&self, ray: &Ray) -> Option<PreparedRay> {
+        PreparedRay::new(ray, self.bounds.as_ref()?)
+    }
+
+    #[inline(always)]
     pub(crate) fn closest<L: Lanes>(&self, ray: &PreparedRay, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
         traverse::closest::<L>(&self.nodes, &self.leaves, ray, accept)
     }
@@ -117,16 +123,25 @@ impl Bvh {
     }
 }
 
-/// The walk compiled for AVX2; all that it calls is inlined here and so compiled for it too.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn closest_avx2(bvh: &Bvh, ray: &PreparedRay, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-    bvh.closest::<Avx2>(ray, accept)
+/// Which code the rays of a tree run through.
+#[derive(Clone, Copy, Debug)]
+enum Instructions {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
-/// See [`closest_avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn any_avx2(bvh: &Bvh, ray: &PreparedRay) -> bool {
-    bvh.any::<Avx2>(ray)
+impl Instructions {
+    /// The widest that this processor has. All give the same hits.
+    fn widest() -> Instructions {
+        #[cfg(target_arch = "x86_64")]
+        if Avx512::detected() {
+            return Instructions::Avx512;
+        } else if Avx2::detected() {
+            return Instructions::Avx2;
+        }
+        Instructions::Portable
+    }
 }

@@ -27,7 +27,8 @@ impl Lanes for Portable {
     fn boxes(node: &Node, ray: &PreparedRay, t_cull: f32) -> (u32, [f32; LANES]) {
         let (mut near, mut far) = ([0.0; LANES], [t_cull; LANES]);
         for axis in 0..3 {
-            let (enter, leave) = (&node.planes[ray.near_plane[axis]], &node.planes[ray.far_plane[axis]]);
+            let (enter, leave) =
+                (&node.planes[ray.near_plane[axis] as usize], &node.planes[ray.far_plane[axis] as usize]);
             for lane in 0..LANES {
                 let t_enter = (enter[lane] - ray.near_origin[axis]) * ray.near_reciprocal[axis];
                 let t_leave = (leave[lane] - ray.far_origin[axis]) * ray.far_reciprocal[axis];
@@ -46,7 +47,7 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn triangles(leaf: &Leaf, ray: &PreparedRay) -> u32 {
-        let [x, y, z] = ray.axes;
+        let [x, y, z] = ray.axes.map(|axis| axis as usize);
         let mut mask = 0;
         for lane in 0..LANES {
             let sheared = |vertex: usize| {
@@ -62,8 +63,9 @@ impl Lanes for Portable {
             let u = c[0] * b[1] - c[1] * b[0];
             let v = a[0] * c[1] - a[1] * c[0];
             let w = b[0] * a[1] - b[1] * a[0];
-            let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
-            mask |= u32::from(inside) << lane;
+            let (min, max) = (|a, b| if a < b { a } else { b }, |a, b| if a > b { a } else { b });
+            let (least, most) = (min(min(u, v), w), max(max(u, v), w));
+            mask |= u32::from((0.0 <= least) | (most <= 0.0)) << lane;
         }
         mask
     }

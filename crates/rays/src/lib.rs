@@ -22,20 +22,23 @@
 //! assert_eq!((hit.u, hit.v), (0.25, 0.5));
 //! ```
 //!
-//! Code map: [`Bvh`] in `bvh`, construction in `build`, memory layout in `node`, per-ray constants
+//! Code map: [`Bvh`] in `bvh`, construction in `build` (`binary`, then `collapse`),
+//! memory layout in `node`, per-ray constants
 //! in `ray`, the walk in `traverse`, the eight-lane tests in `lanes` (portable, the oracle) and
-//! `avx2`, the exact single-triangle test in `triangle`.
+//! `wide` (AVX2 and AVX-512), the exact single-triangle test in `triangle`.
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
+mod binary;
 mod bounds;
 mod build;
 mod bvh;
+mod collapse;
 mod lanes;
 mod node;
 mod ray;
 mod traverse;
 mod triangle;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
 #[cfg(test)]
 mod oracle;

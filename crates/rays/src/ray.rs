@@ -2,7 +2,7 @@
 //!
 //! [`Ray`] and [`Hit`] are the public values; [`PreparedRay`] holds the shear of the watertight
 //! triangle test and the padded slabs of the box test. The padding is derived here, and nowhere
-//! else; `lanes`, `avx2` and `triangle` only use it.
+//! else; `lanes`, `wide` and `triangle` only use it.
 
 /// The value of [`Ray::skip`] that skips nothing.
 pub const NO_TRIANGLE: u32 = u32::MAX;
@@ -80,15 +80,15 @@ pub(crate) struct PreparedRay {
     pub origin: [f32; 3],
     /// The axes x, y, z of the sheared frame: z is the one along which the direction is largest, x
     /// and y follow cyclically.
-    pub axes: [usize; 3],
+    pub axes: [Axis; 3],
     /// `direction[x] / direction[z]` and `direction[y] / direction[z]`, magnitudes at most 1.
     pub shear: [f32; 2],
     /// `direction[z]`.
     pub direction_z: f32,
     /// Per axis, index of the plane where the ray enters and leaves a box, see
     /// [`crate::node::Node::planes`].
-    pub near_plane: [usize; 3],
-    pub far_plane: [usize; 3],
+    pub near_plane: [Plane; 3],
+    pub far_plane: [Plane; 3],
     /// Per axis, the origin moved against and along the direction, so that boxes look larger by the
     /// padding.
     pub near_origin: [f32; 3],
@@ -109,70 +109,79 @@ impl PreparedRay {
     /// axis and along z, and U the unit roundoff. The coordinate x of a sheared vertex is then
     /// wrong by at most 2·U·X + 4·U·Z, and `t` (computed in `f64` from the rounded z) moves the
     /// point by 2·U·Z more. So all that the triangle test can accept lies in the box widened by
-    /// 6·U·(X + Z); taken are 8, because X, Z and the sum below are rounded too. With it the walk
+    /// 6·U·(X + Z); taken are 8, because X, Z and their sum are rounded too, and 2·U of the origin,
+    /// because it is moved by a sum that rounds by half as much. With it the walk
     /// never culls a hit that the triangle test would accept: results equal brute force to the bit.
     /// (After Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013, section 4.)
     #[inline(always)]
     pub fn new(ray: &Ray, bounds: &[[f32; 3]; 2]) -> Option<PreparedRay> {
         let magnitude = ray.direction.map(f32::abs);
-        let z = if magnitude[0] > magnitude[1] {
-            if magnitude[0] > magnitude[2] { 0 } else { 2 }
-        } else if magnitude[1] > magnitude[2] {
-            1
-        } else {
-            2
+        let larger = |i: usize, j: usize| if magnitude[i] > magnitude[j] { i } else { j };
+        let axes = CYCLES[larger(larger(0, 1), 2)];
+        let [x, y, z] = axes.map(|axis| axis as usize);
+        // Every comparison is written so that NaN fails it. All are made: to choose between them
+        // would cost more.
+        let in_range = |values: [f32; 3], most: f32| {
+            (values[0].abs() <= most) & (values[1].abs() <= most) & (values[2].abs() <= most)
         };
-        // Every comparison is written so that NaN fails it.
-        let direction_ok =
-            magnitude.iter().all(|&m| m <= *DIRECTION_RANGE.end()) && magnitude[z] >= *DIRECTION_RANGE.start();
-        let origin_ok = ray.origin.iter().all(|o| o.abs() <= MAX_COORDINATE);
-        let t_max_ok = ray.t_max > 0.0;
-        if !(direction_ok && origin_ok && t_max_ok) {
+        let direction_ok = in_range(magnitude, *DIRECTION_RANGE.end()) & (magnitude[z] >= *DIRECTION_RANGE.start());
+        if !(direction_ok & in_range(ray.origin, MAX_COORDINATE) & (ray.t_max > 0.0)) {
             return None;
         }
 
-        let axes = [NEXT[z], NEXT[NEXT[z]], z];
-        let extent = |axis: usize| {
-            let (below, above) =
-                ((ray.origin[axis] - bounds[0][axis]).abs(), (ray.origin[axis] - bounds[1][axis]).abs());
-            if below > above { below } else { above }
-        };
-        let mut prepared = PreparedRay {
+        let larger = |a: f32, b: f32| if a > b { a } else { b };
+        let extent: [f32; 3] = std::array::from_fn(|axis| {
+            larger((ray.origin[axis] - bounds[0][axis]).abs(), (ray.origin[axis] - bounds[1][axis]).abs())
+        });
+        // The last term is for numbers so small that the products underflow.
+        let padding: [f32; 3] = std::array::from_fn(|axis| {
+            8.0 * U * (extent[axis] + extent[z]) + 2.0 * U * ray.origin[axis].abs() + f32::MIN_POSITIVE
+        });
+        let backward = ray.direction.map(|d| d < 0.0);
+        let along: [f32; 3] = std::array::from_fn(|axis| if backward[axis] { -padding[axis] } else { padding[axis] });
+        // Of a parallel ray either plane may be the near one; both signs of zero must agree with
+        // the choice made here.
+        let reciprocal = ray.direction.map(|d| if d == 0.0 { f32::INFINITY } else { 1.0 / d });
+        Some(PreparedRay {
             origin: ray.origin,
             axes,
-            shear: [ray.direction[axes[0]] / ray.direction[z], ray.direction[axes[1]] / ray.direction[z]],
+            shear: [ray.direction[x] / ray.direction[z], ray.direction[y] / ray.direction[z]],
             direction_z: ray.direction[z],
-            near_plane: [0; 3],
-            far_plane: [0; 3],
-            near_origin: [0.0; 3],
-            far_origin: [0.0; 3],
-            near_reciprocal: [0.0; 3],
-            far_reciprocal: [0.0; 3],
+            near_plane: std::array::from_fn(|axis| if backward[axis] { HIGH[axis] } else { LOW[axis] }),
+            far_plane: std::array::from_fn(|axis| if backward[axis] { LOW[axis] } else { HIGH[axis] }),
+            near_origin: std::array::from_fn(|axis| ray.origin[axis] + along[axis]),
+            far_origin: std::array::from_fn(|axis| ray.origin[axis] - along[axis]),
+            near_reciprocal: reciprocal,
+            far_reciprocal: reciprocal.map(|r| r * FAR_SLACK),
             t_max: ray.t_max,
             skip: ray.skip,
-        };
-        for axis in 0..3 {
-            let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
-            let padding = 8.0 * U * (extent(axis) + extent(z));
-            // Far from zero the padding is lost in the rounding of the sum; the step to the next
-            // float is then at least as large.
-            let (below, above) = ((origin - padding).next_down(), (origin + padding).next_up());
-            // Of a parallel ray either plane may be the near one; both signs of zero must agree
-            // with the choice made here.
-            let reciprocal = if direction == 0.0 { f32::INFINITY } else { 1.0 / direction };
-            if direction < 0.0 {
-                (prepared.near_plane[axis], prepared.far_plane[axis]) = (axis + 3, axis);
-                (prepared.near_origin[axis], prepared.far_origin[axis]) = (below, above);
-            } else {
-                (prepared.near_plane[axis], prepared.far_plane[axis]) = (axis, axis + 3);
-                (prepared.near_origin[axis], prepared.far_origin[axis]) = (above, below);
-            }
-            prepared.near_reciprocal[axis] = reciprocal;
-            prepared.far_reciprocal[axis] = reciprocal * FAR_SLACK;
-        }
-        Some(prepared)
+        })
     }
 }
 
-/// The axis after each, cyclically.
-const NEXT: [usize; 3] = [1, 2, 0];
+/// An index of three, which the compiler knows to be below three.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(usize)]
+pub(crate) enum Axis {
+    X = 0,
+    Y = 1,
+    Z = 2,
+}
+
+/// The axes in cyclic order, by the last of them.
+const CYCLES: [[Axis; 3]; 3] = [[Axis::Y, Axis::Z, Axis::X], [Axis::Z, Axis::X, Axis::Y], [Axis::X, Axis::Y, Axis::Z]];
+
+/// An index of [`crate::node::Node::planes`], likewise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(usize)]
+pub(crate) enum Plane {
+    LowX = 0,
+    LowY = 1,
+    LowZ = 2,
+    HighX = 3,
+    HighY = 4,
+    HighZ = 5,
+}
+
+const LOW: [Plane; 3] = [Plane::LowX, Plane::LowY, Plane::LowZ];
+const HIGH: [Plane; 3] = [Plane::HighX, Plane::HighY, Plane::HighZ];

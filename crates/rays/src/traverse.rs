@@ -10,11 +10,8 @@ use crate::node::{Child, LANES, Leaf, Node};
 use crate::ray::{FAR_SLACK, Hit, PreparedRay};
 use crate::triangle::meet;
 
-/// Most levels of inner nodes; `build` keeps to it.
-pub(crate) const MAX_DEPTH: usize = 40;
-
-/// A node leaves at most all children but one waiting while the walk goes down through that one.
-const STACK: usize = MAX_DEPTH * (LANES - 1) + 1;
+/// Most levels of inner nodes; `binary` keeps to it. The stack stays within a page of memory.
+pub(crate) const MAX_DEPTH: usize = 64;
 
 /// The hit that beats all others among those that `accept` takes.
 #[inline(always)]
@@ -54,19 +51,9 @@ const STOP: f32 = -1.0;
 #[inline(always)]
 fn walk<L: Lanes>(nodes: &[Node], leaves: &[Leaf], ray: &PreparedRay, mut visit: impl FnMut(Hit) -> f32) {
     let mut limit = ray.t_max;
-    let mut stack = [const { MaybeUninit::<Waiting>::uninit() }; STACK];
-    stack[0] = MaybeUninit::new(Waiting::new(0.0, Child::node(0)));
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        // SAFETY: entries below `height` have been written: it starts at 1 with entry 0 written and
-        // grows only after writing.
-        #[allow(unsafe_code)]
-        let top = unsafe { stack[height].assume_init() };
-        if top.t() > limit * FAR_SLACK {
-            continue;
-        }
-        let child = top.child();
+    let mut stack = Stack::new();
+    let mut child = Child::node(0);
+    loop {
         if child.is_leaf() {
             let leaf = &leaves[child.index()];
             for lane in bits(L::triangles(leaf, ray)) {
@@ -77,30 +64,89 @@ fn walk<L: Lanes>(nodes: &[Node], leaves: &[Leaf], ray: &PreparedRay, mut visit:
                     limit = visit(hit);
                 }
             }
-            continue;
-        }
-
-        // Insertion sort onto the stack, farthest lowest: two or three children are met on average.
-        let node = &nodes[child.index()];
-        let (mask, near) = L::boxes(node, ray, limit * FAR_SLACK);
-        let base = height;
-        for lane in bits(mask) {
-            let entry = Waiting::new(near[lane], node.children[lane]);
-            let mut place = height;
-            while place > base {
-                // SAFETY: `base <= place - 1 < height`, and entries below `height` have been
-                // written.
-                #[allow(unsafe_code)]
-                let below = unsafe { stack[place - 1].assume_init() };
-                if below.0 >= entry.0 {
-                    break;
+        } else {
+            let node = &nodes[child.index()];
+            let (mask, near) = L::boxes(node, ray, limit * FAR_SLACK);
+            let entry = |lane: usize| Waiting::new(near[lane], node.children[lane]);
+            // One child is met most often, then two: neither goes through a loop, and the walk goes
+            // on with a child that never was on the stack.
+            if mask != 0 {
+                let (lane, mask) = first(mask);
+                if mask == 0 {
+                    child = node.children[lane];
+                    continue;
                 }
-                stack[place] = MaybeUninit::new(below);
-                place -= 1;
+                let one = entry(lane);
+                let (lane, mut mask) = first(mask);
+                let other = entry(lane);
+                let (nearer, farther) = if one.0 < other.0 { (one, other) } else { (other, one) };
+                let base = stack.height;
+                stack.push(farther);
+                if mask == 0 {
+                    child = nearer.child();
+                    continue;
+                }
+                stack.push(nearer);
+                while mask != 0 {
+                    let lane;
+                    (lane, mask) = first(mask);
+                    stack.insert(base, entry(lane));
+                }
             }
-            stack[place] = MaybeUninit::new(entry);
-            height += 1;
         }
+        child = loop {
+            let Some(top) = stack.pop() else { return };
+            if top.t() <= limit * FAR_SLACK {
+                break top.child();
+            }
+        };
+    }
+}
+
+/// Children that wait, the next one last.
+struct Stack {
+    /// Those below `height` have been written. A node leaves at most all children but one waiting
+    /// while the walk goes down through that one.
+    entries: [MaybeUninit<Waiting>; MAX_DEPTH * (LANES - 1) + 1],
+    height: usize,
+}
+
+impl Stack {
+    #[inline(always)]
+    fn new() -> Stack {
+        Stack { entries: [const { MaybeUninit::uninit() }; _], height: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: Waiting) {
+        self.entries[self.height] = MaybeUninit::new(entry);
+        self.height += 1;
+    }
+
+    /// One step of an insertion sort of the entries from `base` on, farthest lowest.
+    #[inline(always)]
+    fn insert(&mut self, base: usize, entry: Waiting) {
+        let mut place = self.height;
+        while place > base {
+            // SAFETY: `base <= place - 1 < height`, and entries below `height` have been written.
+            #[allow(unsafe_code)]
+            let below = unsafe { self.entries[place - 1].assume_init() };
+            if below.0 >= entry.0 {
+                break;
+            }
+            self.entries[place] = MaybeUninit::new(below);
+            place -= 1;
+        }
+        self.entries[place] = MaybeUninit::new(entry);
+        self.height += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<Waiting> {
+        self.height = self.height.checked_sub(1)?;
+        // SAFETY: entries below what `height` was have been written.
+        #[allow(unsafe_code)]
+        Some(unsafe { self.entries[self.height].assume_init() })
     }
 }
 
@@ -133,8 +179,14 @@ fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
         if mask == 0 {
             return None;
         }
-        let lane = mask.trailing_zeros() as usize & (LANES - 1);
-        mask &= mask - 1;
+        let lane;
+        (lane, mask) = first(mask);
         Some(lane)
     })
+}
+
+/// Place of the lowest one in `mask`, and the rest of it.
+#[inline(always)]
+fn first(mask: u32) -> (usize, u32) {
+    (mask.trailing_zeros() as usize & (LANES - 1), mask & (mask - 1))
 }

@@ -1,7 +1,7 @@
 //! The exact ray–triangle test, one triangle at a time, and the order in which a leaf stores
 //! vertices.
 //!
-//! The eight-lane tests of `lanes` and `avx2` only sift: what they let through is decided here, in
+//! The eight-lane tests of `lanes` and `wide` only sift: what they let through is decided here, in
 //! `f64`. Source: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013,
 //! with the double-precision path for every candidate instead of for zero edge functions only.
 //! Candidates are few (about two per ray), so this is free, and `t` stays on the triangle however
@@ -48,7 +48,7 @@ pub(crate) fn meet(leaf: &Leaf, lane: usize, ray: &PreparedRay, t_limit: f32) ->
     // The sheared frame: the ray becomes the z axis. Rounded to f32 exactly as in the lanes, so
     // that triangles that share a vertex see it at the same place; everything after this is a
     // question about those rounded vertices and is answered without error in sign.
-    let [x, y, z] = ray.axes;
+    let [x, y, z] = ray.axes.map(|axis| axis as usize);
     let sheared = leaf.vertices.each_ref().map(|vertex| {
         let to_z = vertex[z][lane] - ray.origin[z];
         let to_x = (vertex[x][lane] - ray.origin[x]) - ray.shear[0] * to_z;

@@ -97,12 +97,23 @@ fn the_build_does_not_depend_on_threads() {
 #[cfg(target_arch = "x86_64")]
 #[test]
 fn lanes_agree_to_the_bit() {
-    use crate::avx2::Avx2;
+    use crate::wide::{Avx2, Avx512};
 
-    if !is_x86_feature_detected!("avx2") {
+    if Avx2::detected() {
+        agrees_with_portable::<Avx2>();
+    } else {
         println!("no AVX2 here, nothing to compare");
-        return;
     }
+    if Avx512::detected() {
+        agrees_with_portable::<Avx512>();
+    } else {
+        println!("no AVX-512 here, nothing to compare");
+    }
+}
+
+/// Boxes and triangles of any numbers, special ones among them.
+#[cfg(target_arch = "x86_64")]
+fn agrees_with_portable<L: Lanes>() {
     let mut random = Random(9);
     let numbers = [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 1e-30, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
     for round in 0..50_000 {
@@ -123,8 +134,8 @@ fn lanes_agree_to_the_bit() {
             (ray.near_origin, ray.far_origin) = (ray.origin, ray.origin);
         }
         let (mask, near) = Portable::boxes(&node, &ray, t_cull);
-        let (mask_avx2, near_avx2) = Avx2::boxes(&node, &ray, t_cull);
-        assert_eq!((mask, near.map(f32::to_bits)), (mask_avx2, near_avx2.map(f32::to_bits)), "{node:?} {ray:?}");
-        assert_eq!(Portable::triangles(&leaf, &ray), Avx2::triangles(&leaf, &ray), "{leaf:?} {ray:?}");
+        let (wide_mask, wide_near) = L::boxes(&node, &ray, t_cull);
+        assert_eq!((mask, near.map(f32::to_bits)), (wide_mask, wide_near.map(f32::to_bits)), "{node:?} {ray:?}");
+        assert_eq!(Portable::triangles(&leaf, &ray), L::triangles(&leaf, &ray), "{leaf:?} {ray:?}");
     }
 }

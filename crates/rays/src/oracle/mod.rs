@@ -8,10 +8,12 @@ mod limits;
 mod shapes;
 
 use crate::Bvh;
-use crate::lanes::Portable;
+use crate::lanes::{Lanes, Portable};
 use crate::node::{Label, Leaf};
 use crate::ray::{Hit, PreparedRay, Ray};
 use crate::triangle::{can_be_hit, canonical, meet};
+#[cfg(target_arch = "x86_64")]
+use crate::wide::Avx2;
 
 type Triangle = [[f32; 3]; 3];
 
@@ -33,25 +35,33 @@ fn brute_force(leaves: &[Leaf], ray: &PreparedRay) -> Option<Hit> {
     hits.reduce(|best, hit| if hit.beats(&best) { hit } else { best })
 }
 
-/// Asserts that all rays get the same answer from the tree, in both instruction sets, and from
-/// brute force; returns how many hit.
+/// Asserts that all rays get the same answer from the tree, in every instruction set there is, and
+/// from brute force; returns how many hit.
 fn check(triangles: &[Triangle], rays: impl IntoIterator<Item = Ray>) -> usize {
     let (bvh, leaves) = (Bvh::build(triangles), single_leaves(triangles));
     assert_eq!(bvh.left_out() + leaves.len(), triangles.len());
     let mut hits = 0;
     for ray in rays {
-        let prepared = bvh.bounds().and_then(|bounds| PreparedRay::new(&ray, &bounds));
+        let prepared = bvh.prepare(&ray);
         let expected = prepared.as_ref().and_then(|prepared| brute_force(&leaves, prepared));
         // The public calls take the widest instruction set there is, the others are named.
         assert_eq!(bvh.closest_hit(&ray), expected, "{ray:?}");
         assert_eq!(bvh.occluded(&ray), expected.is_some(), "{ray:?}");
         if let Some(prepared) = &prepared {
-            assert_eq!(bvh.closest::<Portable>(prepared, |_| true), expected, "portable, {ray:?}");
-            assert_eq!(bvh.any::<Portable>(prepared), expected.is_some(), "portable, {ray:?}");
+            check_in::<Portable>(&bvh, prepared, expected);
+            #[cfg(target_arch = "x86_64")]
+            if Avx2::detected() {
+                check_in::<Avx2>(&bvh, prepared, expected);
+            }
         }
         hits += usize::from(expected.is_some());
     }
     hits
+}
+
+fn check_in<L: Lanes>(bvh: &Bvh, ray: &PreparedRay, expected: Option<Hit>) {
+    assert_eq!(bvh.closest::<L>(ray, |_| true), expected, "{}, {ray:?}", std::any::type_name::<L>());
+    assert_eq!(bvh.any::<L>(ray), expected.is_some(), "{}, {ray:?}", std::any::type_name::<L>());
 }
 
 struct Random(u64);
