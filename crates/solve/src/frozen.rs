@@ -9,6 +9,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use twinray_scene::geom::Frame;
+use twinray_scene::sample::warp;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 use crate::glossy::GlossyPatches;
@@ -152,9 +154,18 @@ impl<'a> Frozen<'a> {
         self.outgoing(patch).endpoint(self.start.scene.normal(patch), wo)
     }
 
+    /// A direction in which a ray leaves a patch, with density ∝ λ(ω) cosθ; `None` where it falls below the horizon.
+    #[inline]
+    pub(crate) fn sample(&self, patch: PatchId, n: DVec3, u: [f64; 2]) -> Option<DVec3> {
+        if self.start.representatives.is_empty() || self.start.glossy.number_of(patch).is_none() {
+            return Some(Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)));
+        }
+        self.outgoing(patch).sample(n, u)
+    }
+
     /// Outgoing light of a patch.
     #[inline]
-    pub(crate) fn outgoing(&self, patch: PatchId) -> Outgoing {
+    fn outgoing(&self, patch: PatchId) -> Outgoing {
         let source = &self.start.sources[patch.index()];
         let constant = source.radiance();
         let number = match self.start.representatives {

@@ -3,14 +3,29 @@
 //! Local frames have the surface normal as +Z. Transcendental functions come from `libm`, so that every
 //! processor computes the same bits.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
+
+/// Sine and cosine of `u` turns, 0 ≤ u ≤ 1. The quadrant is taken off here, where it is exact and costs nothing, so that the
+/// library need not reduce the angle.
+#[inline]
+fn sincos_of_turn(u: f64) -> (f64, f64) {
+    let quarters = 4.0 * u;
+    let nearest = (quarters + 0.5) as u32;
+    let (sin, cos) = libm::sincos((quarters - f64::from(nearest)) * FRAC_PI_2);
+    match nearest & 3 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
+}
 
 /// Cosine-weighted direction about +Z; density cosθ/π per solid angle.
 #[inline]
 pub fn cosine_hemisphere(u: [f64; 2]) -> DVec3 {
-    let (sin, cos) = libm::sincos(TAU * u[1]);
+    let (sin, cos) = sincos_of_turn(u[1]);
     let r = u[0].sqrt();
     DVec3::new(r * cos, r * sin, (1.0 - u[0]).max(0.0).sqrt())
 }
@@ -26,14 +41,14 @@ pub fn cosine_hemisphere_pdf(cosine: f64) -> f64 {
 pub fn uniform_sphere(u: [f64; 2]) -> DVec3 {
     let z = 1.0 - 2.0 * u[0];
     let r = (1.0 - z * z).max(0.0).sqrt();
-    let (sin, cos) = libm::sincos(TAU * u[1]);
+    let (sin, cos) = sincos_of_turn(u[1]);
     DVec3::new(r * cos, r * sin, z)
 }
 
 /// Uniform point on the unit disc; density 1/π per area.
 #[inline]
 pub fn uniform_disc(u: [f64; 2]) -> [f64; 2] {
-    let (sin, cos) = libm::sincos(TAU * u[1]);
+    let (sin, cos) = sincos_of_turn(u[1]);
     let r = u[0].sqrt();
     [r * cos, r * sin]
 }
@@ -47,8 +62,18 @@ pub fn uniform_triangle(u: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
     use crate::sample::Stream;
     use twinray_testkit::chi2;
+
+    #[test]
+    fn sines_and_cosines_of_turns() {
+        for k in 0..=1000 {
+            let u = f64::from(k) / 1000.0;
+            let ((sin, cos), angle) = (sincos_of_turn(u), TAU * u);
+            assert!((sin - angle.sin()).abs() < 1e-15 && (cos - angle.cos()).abs() < 1e-15, "{u}");
+        }
+    }
 
     #[test]
     fn cosine_hemisphere_matches_its_density() {

@@ -95,11 +95,12 @@ pub(crate) struct Deposits {
 }
 
 impl Deposits {
-    /// Makes room: `targets` are the patches of all deposits to come, as often as they come.
-    pub(crate) fn prepare(&mut self, buckets: Buckets, directions: bool, targets: impl Iterator<Item = PatchId>) {
+    /// Makes room: `targets` calls with the patches of all deposits to come, as often as they come.
+    pub(crate) fn prepare(&mut self, buckets: Buckets, directions: bool, targets: impl FnOnce(&mut dyn FnMut(PatchId))) {
         self.ends.clear();
         self.ends.resize(buckets.count(), 0);
-        targets.for_each(|p| self.ends[buckets.of_patch(p)] += 1);
+        let ends = &mut self.ends;
+        targets(&mut |p| ends[buckets.of_patch(p)] += 1);
         let mut total = 0;
         for end in &mut self.ends {
             let count = *end;

@@ -160,7 +160,7 @@ impl WaveContext<'_> {
             return Some(Shot { shooter: SKY, far: SKY, direction, point });
         };
         let n = self.scene.normal(shooter);
-        let direction = frozen.outgoing(shooter).sample(n, [u[3], u[4]])?;
+        let direction = frozen.sample(shooter, n, [u[3], u[4]])?;
         if n.dot(direction) <= 0.0 {
             return None;
         }
@@ -193,14 +193,17 @@ impl WaveContext<'_> {
             let lamp = tells_direct && self.glossy.number_of(patch).is_some();
             lamp && Shot::patch(far).is_some_and(|far| frozen.is_lamp(far))
         };
-        let targets = shots.iter().flat_map(|shot| {
-            let ends = [(shot.shooter, shot.far), (shot.far, shot.shooter)];
-            ends.into_iter().flat_map(|(end, far)| {
-                let patch = Shot::patch(end).filter(|_| far != BACK);
-                let direct_part = patch.filter(|&p| splits(p, far));
-                [patch, direct_part].into_iter().flatten()
-            })
-        });
+        let targets = |count: &mut dyn FnMut(PatchId)| {
+            for shot in shots.iter().filter(|shot| shot.far != BACK) {
+                for (end, far) in [(shot.shooter, shot.far), (shot.far, shot.shooter)] {
+                    let Some(patch) = Shot::patch(end) else { continue };
+                    count(patch);
+                    if splits(patch, far) {
+                        count(patch);
+                    }
+                }
+            }
+        };
         task.deposits.prepare(buckets, glossy, targets);
 
         let Task { deposits, tally, fit } = task;
