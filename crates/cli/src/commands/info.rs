@@ -74,14 +74,27 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
         100.0 * closedness.escaping_rays
     );
     println!(
-        "memory     {} (rays {}, patches {}, solver {} = {:.0} B a patch)",
+        "memory     {} (rays {}, patches {}, solver {}: {})",
         mb(kernel + constants + state),
         mb(kernel),
         mb(constants),
         mb(state),
-        state as f64 / patches.len() as f64
+        bytes_of_a_patch(patches.len(), glossy)
     );
     println!("cameras    {}", cameras.join(", "));
     println!("{}", commands::balance_line(&balance));
     Ok(Ending::Done)
+}
+
+/// What a patch costs the solver, in words.
+fn bytes_of_a_patch(patches: usize, glossy: usize) -> String {
+    let diffuse = patches - glossy;
+    if glossy == 0 {
+        return format!("{} B a patch", state_bytes(patches, 0, false) / patches);
+    }
+    // All patches of a scene are numbered if one is glossy.
+    let (of_glossy, of_camera) = (state_bytes(1, 1, false), state_bytes(1, 1, true) - state_bytes(1, 1, false));
+    let of_diffuse = (state_bytes(patches, glossy, false) - glossy * of_glossy).checked_div(diffuse);
+    let of_diffuse = of_diffuse.map_or(String::new(), |bytes| format!("{bytes} B a diffuse and "));
+    format!("{of_diffuse}{of_glossy} B a glossy patch, {of_camera} more for a camera")
 }

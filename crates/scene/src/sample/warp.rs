@@ -62,8 +62,8 @@ pub fn uniform_triangle(u: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
     use crate::sample::Stream;
+    use std::f64::consts::TAU;
     use twinray_testkit::chi2;
 
     #[test]

@@ -96,7 +96,12 @@ pub(crate) struct Deposits {
 
 impl Deposits {
     /// Makes room: `targets` calls with the patches of all deposits to come, as often as they come.
-    pub(crate) fn prepare(&mut self, buckets: Buckets, directions: bool, targets: impl FnOnce(&mut dyn FnMut(PatchId))) {
+    pub(crate) fn prepare(
+        &mut self,
+        buckets: Buckets,
+        directions: bool,
+        targets: impl FnOnce(&mut dyn FnMut(PatchId)),
+    ) {
         self.ends.clear();
         self.ends.resize(buckets.count(), 0);
         let ends = &mut self.ends;
