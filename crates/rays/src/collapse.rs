@@ -55,3 +55,54 @@ impl<'a> Binary<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::binary::Item;
+
+    type Open = for<'b, 'a> fn(&'b Binary<'a>) -> Vec<&'b Binary<'a>>;
+
+    /// The work of the wide tree under `binary` whose nodes have the children that `open` gives.
+    fn work(binary: &Binary, open: Open) -> f64 {
+        if binary.items().is_some() {
+            return 0.0;
+        }
+        binary.bounds.half_area() + open(binary).into_iter().map(|child| work(child, open)).sum::<f64>()
+    }
+
+    fn least<'b, 'a>(binary: &'b Binary<'a>) -> Vec<&'b Binary<'a>> {
+        let mut children = Vec::new();
+        binary.open(&mut children);
+        assert!((2..=LANES).contains(&children.len()));
+        children
+    }
+
+    /// Splits the largest child until there are eight: what is usual.
+    fn greedy<'b, 'a>(binary: &'b Binary<'a>) -> Vec<&'b Binary<'a>> {
+        let mut children = vec![binary];
+        while children.len() < LANES {
+            let area = |i: &usize| children[*i].bounds.half_area();
+            let inner = (0..children.len()).filter(|&i| children[i].items().is_none());
+            let Some(largest) = inner.max_by(|i, j| area(i).total_cmp(&area(j))) else { break };
+            let Below::Parts(parts) = &children.swap_remove(largest).below else { unreachable!() };
+            children.extend(parts.iter());
+        }
+        children
+    }
+
+    #[test]
+    fn the_choice_costs_what_was_promised_and_less_than_a_greedy_one() {
+        // A lattice of small triangles that is dense in one corner.
+        let mut items: Vec<Item> = (0..3000u32)
+            .map(|id| {
+                let corner = [id % 10, id / 10 % 15, id / 150].map(|i| (i * i) as f32 / 100.0);
+                Item::new(id, &[corner, corner.map(|c| c + 0.02), [corner[0], corner[1] + 0.03, corner[2]]])
+            })
+            .collect();
+        let root = Binary::over(&mut items, 1);
+        let (promised, chosen, usual) = (root.areas.0[0], work(&root, least), work(&root, greedy));
+        assert!((chosen / promised - 1.0).abs() < 1e-12, "{chosen} {promised}");
+        assert!(chosen < 0.98 * usual, "{chosen} {usual}");
+    }
+}

@@ -110,9 +110,9 @@ impl PreparedRay {
     /// wrong by at most 2·U·X + 4·U·Z, and `t` (computed in `f64` from the rounded z) moves the
     /// point by 2·U·Z more. So all that the triangle test can accept lies in the box widened by
     /// 6·U·(X + Z); taken are 8, because X, Z and their sum are rounded too, and 2·U of the origin,
-    /// because it is moved by a sum that rounds by half as much. With it the walk
-    /// never culls a hit that the triangle test would accept: results equal brute force to the bit.
-    /// (After Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013, section 4.)
+    /// because it is moved by a sum that rounds by half as much. With it the walk never culls a hit
+    /// that the triangle test would accept: results equal brute force to the bit. (After Woop,
+    /// Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2013, section 4.)
     #[inline(always)]
     pub fn new(ray: &Ray, bounds: &[[f32; 3]; 2]) -> Option<PreparedRay> {
         let magnitude = ray.direction.map(f32::abs);

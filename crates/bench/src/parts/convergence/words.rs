@@ -80,7 +80,7 @@ pub fn describe(result: &Value) -> Result<Section, String> {
 fn targets(scenes: &[Curves]) -> Vec<Target> {
     let mut targets = Vec::new();
     for curves in scenes {
-        let bound = if FEWER_SCENES.contains(&curves.scene) { FEWER } else { 1.0 };
+        let bound = if FEWER_SCENES.iter().any(|s| curves.scene.starts_with(s)) { FEWER } else { 1.0 };
         if let Some((ratio, note)) = curves.ratio("paper", "default", AT) {
             let what = format!("{}: rays of the paper preset over the default's, to {}", curves.scene, share(AT));
             targets.push(Target::at_least(what, bound, ratio, times).noted(note));
