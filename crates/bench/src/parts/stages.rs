@@ -28,7 +28,7 @@ const STAGES: [(Stage, &str, &str); 7] = [
     (Stage::Trace, "trace", "closest hit, and the cell that was hit"),
     (Stage::Estimate, "estimate", "light and densities at both ends, deposits by buckets"),
     (Stage::Deposit, "deposit", "sums of buckets, entered into the state"),
-    (Stage::Wait, "wait", "between tasks, and a thread that finds none left"),
+    (Stage::Wait, "wait", "a second thread's part of freeze and deposit, and its waiting"),
 ];
 
 thread_local! {

@@ -28,7 +28,9 @@ use order::Order;
 
 /// Rays of one task: few enough for its arrays to stay in a core's cache.
 const TASK: u64 = 4096;
-/// Small waves are shared out as well, down to tasks of this size.
+/// Small waves are shared out as well, so that no thread waits long for the last task: into so many tasks, of at least so many
+/// rays.
+const TASKS: u64 = 64;
 const SMALLEST_TASK: u64 = 256;
 /// One ray of so many is a witness for the shares of the strategies.
 const WITNESS: usize = 8;
@@ -105,7 +107,7 @@ impl WaveContext<'_> {
         let Wave { order, tasks } = wave;
         order.fill(sobol, first, count);
         (self.lap)(Stage::Order);
-        let wished = (count / TASK).max((count / SMALLEST_TASK).min(16)).max(1);
+        let wished = (count / TASK).max((count / SMALLEST_TASK).min(TASKS)).max(1);
         let number = (wished.next_power_of_two() as usize).min(order.places());
         tasks.resize_with(number, Task::default);
         let runs: Vec<SobolBlock> = order.bases().map(|base| sobol.block(base)).collect();
