@@ -48,7 +48,7 @@ impl<'a> Solver<'a> {
             if let Some(value) = shares.to_array().into_iter().find(|s| !(0.0..=1.0).contains(s)) {
                 return Err(SolveError::Setting { name: "share of a strategy", value, expected });
             }
-            if !((sum - 1.0).abs() < 1e-9) {
+            if (sum - 1.0).abs() > 1e-9 {
                 return Err(SolveError::Setting { name: "sum of the shares", value: sum, expected });
             }
         }
