@@ -79,7 +79,7 @@ pub fn json(points: &[Point]) -> Value {
     points.iter().map(|p| json!({"rays": p.rays, "seconds": p.seconds, "error": p.error})).collect()
 }
 
-/// What [`json`] stored.
+/// What [`json()`] stored.
 pub fn read(stored: &Reader) -> Result<Vec<Point>, String> {
     let point = |p: &Reader| {
         let number = |key| p.get(key)?.number();
