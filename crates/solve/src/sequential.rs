@@ -35,13 +35,19 @@ pub(crate) struct Sequential {
     updates: u64,
     emitted: Rgb,
     tree: PowerTree,
-    /// Per patch: Σ I, W·m⁻².
-    irradiance_n: Vec<[f64; 3]>,
-    evidence: Vec<Evidence>,
+    patches: Vec<PatchState>,
     glossy: Vec<GlossyState>,
     tally: Tally,
     /// Deposits of the current batch.
     pending: Vec<Pending>,
+}
+
+/// What every patch has, side by side: a ray touches two of them anywhere in memory.
+#[derive(Clone, Copy, Debug, Default)]
+struct PatchState {
+    /// Σ I, W·m⁻².
+    irradiance_n: [f64; 3],
+    evidence: Evidence,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -72,8 +78,7 @@ impl Sequential {
             updates: 0,
             emitted: scene.emitted_power(),
             tree: PowerTree::new(emitted),
-            irradiance_n: vec![[0.0; 3]; scene.len()],
-            evidence: vec![Evidence::default(); scene.len()],
+            patches: vec![PatchState::default(); scene.len()],
             glossy: vec![GlossyState::default(); glossy.patches().len()],
             tally: Tally::default(),
             pending: Vec::new(),
@@ -159,11 +164,10 @@ impl Sequential {
         let albedo = brdf.albedo(n.dot(p.wi));
         self.tally.arrived += p.deposit;
         self.tally.absorbed += p.deposit * (Rgb::WHITE - albedo);
-        let evidence = &mut self.evidence[p.patch.index()];
-        evidence.squares += p.deposit.luminance().powi(2);
-        evidence.hits = evidence.hits.saturating_add(1);
-        let sum = &mut self.irradiance_n[p.patch.index()];
-        *sum = (Rgb::from_array(*sum) + irradiance).to_array();
+        let state = &mut self.patches[p.patch.index()];
+        state.evidence.squares += p.deposit.luminance().powi(2);
+        state.evidence.hits = state.evidence.hits.saturating_add(1);
+        state.irradiance_n = (Rgb::from_array(state.irradiance_n) + irradiance).to_array();
         self.tree.add_reflected(p.patch.index(), (p.deposit * albedo).luminance());
         self.updates += 1;
 
@@ -236,7 +240,7 @@ impl Sequential {
         }
         let main_part_n = match glossy.number_of(patch) {
             Some(k) => self.glossy[k].main_part_n,
-            None => Rgb::from_array(self.irradiance_n[patch.index()]) * scene.brdf(patch).mean_albedo() / PI,
+            None => Rgb::from_array(self.patches[patch.index()].irradiance_n) * scene.brdf(patch).mean_albedo() / PI,
         };
         main_part_n / self.n as f64
     }
@@ -279,7 +283,7 @@ impl Sequential {
     }
 
     fn irradiance(&self, patch: PatchId) -> Rgb {
-        Rgb::from_array(self.irradiance_n[patch.index()]) / self.n.max(1) as f64
+        Rgb::from_array(self.patches[patch.index()].irradiance_n) / self.n.max(1) as f64
     }
 
     /// The paper's rays are independent, so their squares need no calibration; what noise adds by being reflected is
@@ -287,7 +291,7 @@ impl Sequential {
     fn noise(&self) -> Noise<impl Fn(PatchId) -> PatchNoise> {
         let of = |p: PatchId| PatchNoise {
             irradiance: self.irradiance(p).luminance(),
-            evidence: self.evidence[p.index()],
+            evidence: self.patches[p.index()].evidence,
             half_difference: None,
         };
         Noise { rays: self.n.max(1) as f64, of }
@@ -321,7 +325,7 @@ impl Sequential {
             glossy_light,
             balance: balance(&self.tally, self.emitted, n),
             standard_error: self.noise().standard_errors(scene),
-            hits: self.evidence.iter().map(|e| e.hits).collect(),
+            hits: self.patches.iter().map(|p| p.evidence.hits).collect(),
             relative_error: self.relative_error(scene),
             tally: self.tally,
             splits_direct_light: false,
