@@ -61,8 +61,8 @@ const WITNESSES: f64 = 1000.0;
 
 /// How much the square of a deposit matters: c_i, so that Σ c_i d² estimates what is to be made small.
 ///
-/// One part is the relative mean square error of irradiance as it is reported everywhere, ΣA ΔE²/ΣA E² without emitters;
-/// the other the mean over patches of (ΔE/E)², which sees small patches and dark ones.
+/// There are two such errors: the relative mean square error of irradiance as it is reported everywhere, ΣA ΔE²/ΣA E² without
+/// emitters, and the mean over patches of (ΔE/E)², which sees small patches and dark ones.
 #[derive(Debug)]
 pub(crate) struct Witness<'a> {
     scene: &'a PatchScene,
@@ -113,61 +113,67 @@ impl Known {
 }
 
 impl Witness<'_> {
-    /// c_i d².
+    /// c_i d² of both errors: over area, over patches.
     #[inline]
-    pub(crate) fn square(&self, patch: PatchId, power: Rgb) -> f64 {
+    pub(crate) fn squares(&self, patch: PatchId, power: Rgb) -> [f64; 2] {
         if !self.known.emitters && !self.scene.emission(patch).is_black() {
-            return 0.0;
+            return [0.0; 2];
         }
         let area = self.scene.area(patch);
         let least = LEAST_IRRADIANCE * self.known.irradiance * area;
         let known = (Rgb::from_array(self.deposits[patch.index()]).luminance() / self.weight).max(least);
-        let relative = RELATIVE / (self.scene.len() as f64 * known * known);
         let square = power.luminance() * power.luminance();
-        square * (1.0 / (area * self.known.energy) + relative)
+        [square / (area * self.known.energy), square / (self.scene.len() as f64 * known * known)]
     }
 }
 
 /// Of the mean irradiance, what a patch without hits counts as.
 const LEAST_IRRADIANCE: f64 = 0.1;
-/// Weight of the second part.
-const RELATIVE: f64 = 0.1;
+/// The error over area is multiplied by so high a power of the error over patches, and the product is made small: the latter
+/// has to fall by three percent for every percent that the former rises. A sum would let the thousands of dark slivers of a real
+/// scene have nearly all of the rays.
+const OVER_PATCHES: f64 = 1.0 / 3.0;
 
 /// What witnesses tell of the strategies.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fit {
-    /// Σ c d² for which each is responsible.
-    sums: [f64; STRATEGIES],
+    /// Σ c d² of both errors for which each is responsible.
+    sums: [[f64; STRATEGIES]; 2],
     witnesses: f64,
 }
 
 impl Fit {
-    /// One witness: Σ c d² of its deposits; λ at both ends together, and what of it each strategy gives at either.
+    /// One witness: Σ c d² of its deposits, of both errors; λ at both ends together, and what of it each strategy gives at either.
     #[inline]
-    pub(crate) fn observe(&mut self, squares: f64, density: f64, a: [f64; STRATEGIES], b: [f64; STRATEGIES]) {
-        let per_density = squares / density;
-        for k in 0..STRATEGIES {
-            self.sums[k] += per_density * (a[k] + b[k]);
+    pub(crate) fn observe(&mut self, squares: [f64; 2], density: f64, a: [f64; STRATEGIES], b: [f64; STRATEGIES]) {
+        for (sums, square) in self.sums.iter_mut().zip(squares) {
+            for k in 0..STRATEGIES {
+                sums[k] += square / density * (a[k] + b[k]);
+            }
         }
         self.witnesses += 1.0;
     }
 
     /// Adds the witnesses of other rays.
     pub(crate) fn add(&mut self, other: &Fit) {
-        self.sums.iter_mut().zip(&other.sums).for_each(|(a, b)| *a += b);
+        self.sums.iter_mut().flatten().zip(other.sums.iter().flatten()).for_each(|(a, b)| *a += b);
         self.witnesses += other.witnesses;
     }
 
     /// The shares after a step; the old ones until there are enough witnesses.
     pub(crate) fn step(&self, old: Shares) -> Shares {
-        let total: f64 = self.sums.iter().sum();
-        if self.witnesses < WITNESSES || !(total.is_finite() && total > 0.0) {
+        let totals = self.sums.map(|sums| sums.iter().sum::<f64>());
+        if self.witnesses < WITNESSES || !totals.iter().all(|t| t.is_finite() && *t > 0.0) {
             return old;
         }
         let old = old.to_array();
+        // What each is responsible for of the product of both errors, in logarithms.
+        let part = |k: usize| {
+            (self.sums[0][k] / totals[0] + OVER_PATCHES * self.sums[1][k] / totals[1]) / (1.0 + OVER_PATCHES)
+        };
         // Half of a step: whole ones swing to and fro between strategies that do not overlap, whose best shares are the
         // geometric mean of these two.
-        let mut next: [f64; STRATEGIES] = std::array::from_fn(|k| (old[k] * self.sums[k] / total).sqrt());
+        let mut next: [f64; STRATEGIES] = std::array::from_fn(|k| (old[k] * part(k)).sqrt());
         let sum: f64 = next.iter().sum();
         for (share, old) in next.iter_mut().zip(old).filter(|(_, old)| *old > 0.0) {
             *share = (*share / sum).max(LEAST.min(old));
@@ -197,7 +203,7 @@ mod tests {
                 let (density, value) = if first { (2.0 * shares.power, 4.0) } else { (2.0 * shares.lamps, 1.0) };
                 let parts = if first { [density, 0.0] } else { [0.0, density] };
                 let square = (value / density) * (value / density);
-                fit.observe(square, density, [parts[0], parts[1], 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
+                fit.observe([square; 2], density, [parts[0], parts[1], 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
             }
             shares = fit.step(shares);
         }
@@ -209,7 +215,7 @@ mod tests {
     #[test]
     fn nothing_starves_and_few_witnesses_change_nothing() {
         let mut fit = Fit::default();
-        let all_by_power = |fit: &mut Fit| fit.observe(1.0, 1.0, [1.0, 0.0, 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
+        let all_by_power = |fit: &mut Fit| fit.observe([1.0; 2], 1.0, [1.0, 0.0, 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
         all_by_power(&mut fit);
         let first = Shares::first(false);
         assert_eq!(fit.step(first), first);

@@ -260,8 +260,9 @@ impl WaveContext<'_> {
                     Some(patch) => frozen.parts(patch, e.density),
                     None => [0.0, 0.0, 0.0, 0.0, e.density],
                 };
-                let weight = |end: u32, power: Rgb| Shot::patch(end).map_or(0.0, |p| witness.square(p, power));
-                let squares = weight(shot.far, on_far) + weight(shot.shooter, on_shooter);
+                let squares = |end: u32, power: Rgb| Shot::patch(end).map_or([0.0; 2], |p| witness.squares(p, power));
+                let [a, b] = [squares(shot.far, on_far), squares(shot.shooter, on_shooter)];
+                let squares = [a[0] + b[0], a[1] + b[1]];
                 fit.observe(squares, here.density + there.density, parts(shot.shooter, &here), parts(shot.far, &there));
             }
         }
