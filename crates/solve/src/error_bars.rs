@@ -11,7 +11,8 @@
 //! Not here: bias. What there is of it stands in `docs/paper.md`: the loss of the paper's 1/n average, and a far smaller
 //! one of the default preset's low-discrepancy numbers.
 
-use twinray_scene::{PatchId, PatchScene};
+use bytemuck::{Pod, Zeroable};
+use twinray_scene::PatchId;
 
 /// What a patch's error bar is made from. Sums over rays with equal weights.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,9 +24,9 @@ pub(crate) struct Evidence {
 }
 
 /// The evidence of two replicas on one patch. Entered once a wave, so that single precision does not stall.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct PackedEvidence {
+pub struct PatchEvidence {
     /// Σ 𝓛(deposit)² of both, W².
     pub squares: f32,
     /// Σ 𝓛(deposit) of the first minus that of the second, W.
@@ -37,6 +38,10 @@ pub(crate) struct PackedEvidence {
 /// What is known of one patch's noise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PatchNoise {
+    /// m².
+    pub area: f64,
+    /// Whether the patch emits: such are left out of the error of the whole.
+    pub emits: bool,
     /// 𝓛(E), W·m⁻².
     pub irradiance: f64,
     /// Of all rays.
@@ -49,6 +54,8 @@ pub(crate) struct PatchNoise {
 pub(crate) struct Noise<F> {
     /// Rays, or the weight of all of them.
     pub rays: f64,
+    /// How many there are.
+    pub patches: usize,
     /// Asked several times for every patch.
     pub of: F,
 }
@@ -63,26 +70,30 @@ const OCTAVES: usize = 32;
 
 impl<F: Fn(PatchId) -> PatchNoise> Noise<F> {
     /// Per patch: standard error of 𝓛(E), W·m⁻²; infinite where nothing arrived.
-    pub fn standard_errors(&self, scene: &PatchScene) -> Vec<f32> {
-        let octaves = self.octaves(scene);
+    pub fn standard_errors(&self) -> Vec<f32> {
+        let octaves = self.octaves();
         let bar = |p: PatchId| {
             let noise = (self.of)(p);
             match noise.evidence.hits {
                 0 => f32::INFINITY,
-                hits => (octaves[octave(hits)].mean() * self.independent(scene, p, &noise)).sqrt() as f32,
+                hits => (octaves[octave(hits)].mean() * self.independent(&noise)).sqrt() as f32,
             }
         };
-        scene.patches().map(bar).collect()
+        self.all().map(bar).collect()
+    }
+
+    fn all(&self) -> impl Iterator<Item = PatchId> + use<F> {
+        (0..self.patches).map(|k| PatchId(k as u32))
     }
 
     /// Mean ratio of the replicas' variance to that of independent rays, by number of hits. Every patch has the same
     /// say.
-    fn octaves(&self, scene: &PatchScene) -> [Ratio; OCTAVES] {
+    fn octaves(&self) -> [Ratio; OCTAVES] {
         let mut octaves = [Ratio::default(); OCTAVES];
         let mut whole = Ratio { sum: PRIOR_PATCHES, patches: PRIOR_PATCHES };
-        for p in scene.patches() {
+        for p in self.all() {
             let noise = (self.of)(p);
-            let (hits, variance) = (noise.evidence.hits, self.independent(scene, p, &noise));
+            let (hits, variance) = (noise.evidence.hits, self.independent(&noise));
             if let Some(half_difference) = noise.half_difference.filter(|_| hits > 0 && variance > 0.0) {
                 octaves[octave(hits)].add(half_difference.powi(2) / variance, 1.0);
             }
@@ -93,28 +104,28 @@ impl<F: Fn(PatchId) -> PatchNoise> Noise<F> {
     }
 
     /// Var(E) of a mean over independent rays, (Σd² − (Σd)²/N)/(N A)², W²·m⁻⁴.
-    fn independent(&self, scene: &PatchScene, patch: PatchId, noise: &PatchNoise) -> f64 {
-        let per_area = 1.0 / (self.rays * scene.area(patch));
+    fn independent(&self, noise: &PatchNoise) -> f64 {
+        let per_area = 1.0 / (self.rays * noise.area);
         let mean_square = noise.irradiance.powi(2) / self.rays;
         (noise.evidence.squares * per_area * per_area - mean_square).max(0.0)
     }
 
     /// √(ΣA Var(E) / ΣA E²) of luminance, emitters left out (unless no other patch is lit). The squares of differences
     /// estimate the mean square error without bias, whatever is known of single patches.
-    pub fn relative_error(&self, scene: &PatchScene) -> f64 {
-        let variance = |p: PatchId, noise: &PatchNoise| match noise.half_difference {
+    pub fn relative_error(&self) -> f64 {
+        let variance = |noise: &PatchNoise| match noise.half_difference {
             Some(half_difference) => half_difference.powi(2),
-            None => self.independent(scene, p, noise),
+            None => self.independent(noise),
         };
-        let sums = |which: &dyn Fn(PatchId) -> bool| {
-            scene.patches().filter(|&p| which(p)).fold([0.0; 2], |[squares, energy], p| {
-                let (area, noise) = (scene.area(p), (self.of)(p));
-                [squares + area * variance(p, &noise), energy + area * noise.irradiance.powi(2)]
+        let sums = |emitters: bool| {
+            let those = self.all().map(&self.of).filter(|noise| emitters || !noise.emits);
+            those.fold([0.0; 2], |[squares, energy], noise| {
+                [squares + noise.area * variance(&noise), energy + noise.area * noise.irradiance.powi(2)]
             })
         };
-        let mut sum = sums(&|p| scene.emission(p).is_black());
+        let mut sum = sums(false);
         if sum[1] <= 0.0 {
-            sum = sums(&|_| true);
+            sum = sums(true);
         }
         let [squares, energy] = sum;
         // Noise makes ΣA E² too large by what it adds itself.

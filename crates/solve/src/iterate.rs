@@ -9,6 +9,7 @@ use crate::frozen;
 use crate::glossy::GlossyPatches;
 use crate::observer::Observer;
 use crate::params::{Params, Schedule, SolveError};
+use crate::record::{Record, RecordError};
 use crate::replicas::Replicas;
 use crate::sequential::Sequential;
 use crate::solution::Solution;
@@ -42,27 +43,9 @@ impl<'a> Solver<'a> {
     /// # Errors
     /// If nothing emits, or a setting is out of range.
     pub fn new(scene: &'a PatchScene, params: Params, observer: Option<Observer>) -> Result<Self, SolveError> {
-        if let Some(shares) = params.shares {
-            let expected = "at least 0, and all of them 1 together";
-            let sum: f64 = shares.to_array().iter().sum();
-            if let Some(value) = shares.to_array().into_iter().find(|s| !(0.0..=1.0).contains(s)) {
-                return Err(SolveError::Setting { name: "share of a strategy", value, expected });
-            }
-            if (sum - 1.0).abs() > 1e-9 {
-                return Err(SolveError::Setting { name: "sum of the shares", value: sum, expected });
-            }
-        }
-        if !(0.0..=1e6).contains(&params.warm_start) {
-            let expected = "0 to 1000000 rays per patch";
-            return Err(SolveError::Setting { name: "warm start", value: params.warm_start, expected });
-        }
-        let sky = scene.environment().is_some_and(|e| e.power().luminance() > 0.0);
-        if scene.emitted_power().luminance() <= 0.0 && !sky {
-            return Err(SolveError::NoLight);
-        }
+        check(scene, &params)?;
         let glossy = GlossyPatches::new(scene, observer.as_ref());
         let state = match params.schedule {
-            Schedule::Paper { .. } if sky => return Err(SolveError::PaperEnvironment),
             Schedule::Paper { batch } => State::Sequential(Box::new(Sequential::new(scene, &glossy)), batch.max(1)),
             Schedule::Waves => {
                 let around = Surroundings { scene, glossy: &glossy, params: &params, lap: &|_| () };
@@ -70,6 +53,47 @@ impl<'a> Solver<'a> {
             }
         };
         Ok(Self { scene, params, glossy, state })
+    }
+
+    /// Goes on from what [`Solver::record`] gave: the same scene and settings then give the same bits as if nothing had come
+    /// between, the number of threads being free.
+    ///
+    /// # Errors
+    /// As [`Solver::new`]; and if the record is of another scene or schedule, has no state to go on from, or holds what no
+    /// solve gives.
+    pub fn resume(scene: &'a PatchScene, params: Params, record: &Record) -> Result<Self, SolveError> {
+        check(scene, &params)?;
+        record.check()?;
+        let glossy = GlossyPatches::new(scene, None);
+        record.check_lengths(scene.len(), glossy.patches().len())?;
+        let state = match (params.schedule, record) {
+            (Schedule::Waves, Record::Waves(waves)) => {
+                let around = Surroundings { scene, glossy: &glossy, params: &params, lap: &|_| () };
+                State::Waves(Box::new(Replicas::resume(around, waves)?))
+            }
+            (Schedule::Paper { batch }, Record::Sequential(sequential)) => {
+                State::Sequential(Box::new(Sequential::resume(scene, &glossy, sequential)?), batch.max(1))
+            }
+            (Schedule::Waves, _) => return Err(RecordError::Schedule { expected: "waves" }.into()),
+            (Schedule::Paper { .. }, _) => return Err(RecordError::Schedule { expected: "the paper's" }.into()),
+        };
+        Ok(Self { scene, params, glossy, state })
+    }
+
+    /// Everything that decides how the solve goes on, but for what an observer was sent. O(K).
+    pub fn record(&self) -> Record<'_> {
+        match &self.state {
+            State::Sequential(s, _) => Record::Sequential(s.record()),
+            State::Waves(w) => Record::Waves(w.record()),
+        }
+    }
+
+    /// True before the first wave or iteration: what a warm start alone gives is too coarse to be judged.
+    pub fn is_new(&self) -> bool {
+        match &self.state {
+            State::Sequential(s, _) => s.rays() == 0,
+            State::Waves(w) => w.is_new(),
+        }
     }
 
     /// Rays so far, n.
@@ -138,6 +162,32 @@ impl<'a> Solver<'a> {
                 w.solution(Surroundings { scene: self.scene, glossy: &self.glossy, params: &self.params, lap: &|_| () })
             }
         }
+    }
+}
+
+/// What can be wrong with settings, alone or with this scene.
+fn check(scene: &PatchScene, params: &Params) -> Result<(), SolveError> {
+    if let Some(shares) = params.shares {
+        let expected = "at least 0, and all of them 1 together";
+        let sum: f64 = shares.to_array().iter().sum();
+        if let Some(value) = shares.to_array().into_iter().find(|s| !(0.0..=1.0).contains(s)) {
+            return Err(SolveError::Setting { name: "share of a strategy", value, expected });
+        }
+        if (sum - 1.0).abs() > 1e-9 {
+            return Err(SolveError::Setting { name: "sum of the shares", value: sum, expected });
+        }
+    }
+    if !(0.0..=1e6).contains(&params.warm_start) {
+        let expected = "0 to 1000000 rays per patch";
+        return Err(SolveError::Setting { name: "warm start", value: params.warm_start, expected });
+    }
+    let sky = scene.environment().is_some_and(|e| e.power().luminance() > 0.0);
+    if scene.emitted_power().luminance() <= 0.0 && !sky {
+        return Err(SolveError::NoLight);
+    }
+    match params.schedule {
+        Schedule::Paper { .. } if sky => Err(SolveError::PaperEnvironment),
+        _ => Ok(()),
     }
 }
 

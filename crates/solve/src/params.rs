@@ -1,5 +1,6 @@
 //! Every knob of the solver, with its default and its place in the paper; the presets.
 
+use crate::record::RecordError;
 use crate::strategies::Shares;
 
 /// How a ray's two transfers are estimated (paper §1 and §2).
@@ -100,6 +101,9 @@ pub enum SolveError {
         /// What it may be.
         expected: &'static str,
     },
+    /// What was written down cannot be used.
+    #[error("{0}")]
+    Record(#[from] RecordError),
     /// The paper's schedule knows no environment.
     #[error(
         "the paper preset selects patches only and cannot shoot from an environment: use the default preset, or light the scene with emitting surfaces"

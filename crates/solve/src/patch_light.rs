@@ -7,7 +7,7 @@
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PatchLight {
     /// Area, m².
-    pub area: Vec<f32>,
+    pub area: Vec<f64>,
     /// True where the patch emits: such patches are left out of mean errors.
     pub emits: Vec<bool>,
     /// Irradiance, W·m⁻² (or lux where radiance is in nit), mean over the patch.

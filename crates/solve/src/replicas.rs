@@ -4,18 +4,18 @@
 //! before it was sent on, the one remembered sample of a glossy patch. Independence costs a few percent of error,
 //! since each half is stratified alone (`docs/paper.md`); nothing else tells a stratified solve's error from within.
 
-use std::f64::consts::PI;
+use std::borrow::Cow;
 
+use twinray_scene::PatchScene;
 use twinray_scene::sample::Stream;
-use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use crate::error_bars::{Evidence, Noise, PatchNoise};
-use crate::params::Representation;
-use crate::solution::{GlossySolution, Solution};
+use crate::record::{RecordError, RunRecord, WavesRecord};
+use crate::solution::Solution;
 use crate::strategies::Shares;
+use crate::sums::Sums;
 use crate::tally::Tally;
 use crate::wave::OutputState;
-use crate::waves::{Surroundings, Waves, Workspace, balance};
+use crate::waves::{Surroundings, Waves, Workspace};
 
 const STREAM_REPLICA: u64 = 5;
 
@@ -32,11 +32,53 @@ impl Replicas {
     pub(crate) fn new(around: Surroundings) -> Self {
         let mut workspace = Workspace::default();
         let mut output = OutputState::new(around.scene.len(), around.glossy);
-        let runs = [(0, 1.0), (1, -1.0)].map(|(k, sign)| {
-            let seed = Stream::new(around.params.seed, STREAM_REPLICA, k).bits();
+        let runs = [0, 1].map(|k| {
+            let (seed, sign) = Self::replica(around, k);
             Waves::new(around, seed, sign, &mut output, &mut workspace)
         });
         Self { runs, output, workspace }
+    }
+
+    /// Goes on from what was written down, whose arrays are checked and of this scene.
+    pub(crate) fn resume(around: Surroundings, record: &WavesRecord) -> Result<Self, RecordError> {
+        let [first, second] = record.runs.as_ref().ok_or(RecordError::Merged)?;
+        let run = |k: usize, record: &RunRecord, representatives: &[_]| {
+            let (seed, sign) = Self::replica(around, k);
+            Waves::resume(around, seed, sign, record, representatives)
+        };
+        let runs = [run(0, first, &record.representatives)?, run(1, second, &second.representatives)?];
+        let mut output = OutputState::new(around.scene.len(), around.glossy);
+        output.deposits.copy_from_slice(&record.deposits);
+        output.evidence.copy_from_slice(&record.evidence);
+        output.reflected.copy_from_slice(&record.reflected);
+        Ok(Self { runs, output, workspace: Workspace::default() })
+    }
+
+    /// Seed and sign of a replica.
+    fn replica(around: Surroundings, k: usize) -> (u64, f64) {
+        (Stream::new(around.params.seed, STREAM_REPLICA, k as u64).bits(), [1.0, -1.0][k])
+    }
+
+    /// Writes everything down but what an observer was sent.
+    pub(crate) fn record(&self) -> WavesRecord<'_> {
+        let sums = self.sums();
+        let [first, mut second] = [0, 1].map(|k| self.runs[k].record());
+        second.representatives = Cow::Borrowed(self.runs[1].representatives());
+        WavesRecord {
+            rays: sums.rays,
+            weight: sums.weight,
+            tally: sums.tally,
+            deposits: Cow::Borrowed(sums.deposits),
+            evidence: Cow::Borrowed(sums.evidence),
+            reflected: Cow::Borrowed(sums.reflected),
+            representatives: Cow::Borrowed(sums.representatives),
+            runs: Some([first, second]),
+        }
+    }
+
+    /// True until the first wave of both.
+    pub(crate) fn is_new(&self) -> bool {
+        self.runs.iter().all(Waves::is_new)
     }
 
     /// Rays of both.
@@ -53,7 +95,7 @@ impl Replicas {
     pub(crate) fn advance(&mut self, around: Surroundings) {
         // In a glossy scene the warm start takes lobes for diffuse: that is good enough to start from, but kept in the
         // output it would be a bias that fades as 1/n only.
-        if !around.glossy.patches().is_empty() && self.runs.iter().all(Waves::is_new) {
+        if !around.glossy.patches().is_empty() && self.is_new() {
             self.output.clear();
             self.runs.iter_mut().for_each(Waves::forget_output);
         }
@@ -61,59 +103,26 @@ impl Replicas {
     }
 
     pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
-        self.noise(scene).relative_error(scene)
+        self.sums().relative_error(scene)
     }
 
-    /// Weight of the sums: rays, but for what was forgotten.
-    fn weight(&self) -> f64 {
-        self.runs.iter().map(Waves::weight).sum()
-    }
-
-    fn irradiance(&self, scene: &PatchScene, patch: PatchId) -> Rgb {
-        Rgb::from_array(self.output.deposits[patch.index()]) / (self.weight() * scene.area(patch))
-    }
-
-    fn noise<'a>(&'a self, scene: &'a PatchScene) -> Noise<impl Fn(PatchId) -> PatchNoise + use<'a>> {
-        let of = move |p: PatchId| {
-            let evidence = self.output.evidence[p.index()];
-            PatchNoise {
-                irradiance: self.irradiance(scene, p).luminance(),
-                evidence: Evidence { squares: f64::from(evidence.squares), hits: evidence.hits },
-                // Both have half of the weight.
-                half_difference: Some(f64::from(evidence.difference) / (self.weight() * scene.area(p))),
-            }
-        };
-        Noise { rays: self.weight(), of }
+    /// The sums of both.
+    pub(crate) fn sums(&self) -> Sums<'_> {
+        let mut tally = Tally::default();
+        self.runs.iter().for_each(|run| tally.add_weighted(run.tally(), 1.0));
+        Sums {
+            rays: self.rays(),
+            weight: self.runs.iter().map(Waves::weight).sum(),
+            tally,
+            deposits: &self.output.deposits,
+            evidence: &self.output.evidence,
+            reflected: &self.output.reflected,
+            observed: &self.output.observed,
+            representatives: self.runs[0].representatives(),
+        }
     }
 
     pub(crate) fn solution(&self, around: Surroundings) -> Solution {
-        let Surroundings { scene, glossy, params, .. } = around;
-        let glossy_light = glossy.patches().iter().enumerate().map(|(k, &p)| {
-            let per_area = 1.0 / (self.weight() * scene.area(p));
-            let observed = self.output.observed.get(k).filter(|_| glossy.to_eye(k).is_some());
-            let observed = observed.filter(|_| params.representation != Representation::Main);
-            GlossySolution {
-                main_part: Rgb::from_f32(self.output.reflected[k]) * (per_area / PI),
-                // A representative is one sample whoever remembers it; its average over solutions is what converges.
-                directional: self.runs[0].representatives()[k].directional(scene, p, params.representation),
-                observed_lobe: observed.map(|parts| parts.map(|part| Rgb::from_f32(part) * per_area)),
-            }
-        });
-        let glossy_light = glossy_light.collect();
-        let mut tally = Tally::default();
-        self.runs.iter().for_each(|run| tally.add_weighted(run.tally(), 1.0));
-        let noise = self.noise(scene);
-        Solution {
-            rays: self.rays(),
-            irradiance: scene.patches().map(|p| self.irradiance(scene, p).to_f32()).collect(),
-            standard_error: noise.standard_errors(scene),
-            hits: self.output.evidence.iter().map(|e| e.hits).collect(),
-            glossy: glossy.clone(),
-            glossy_light,
-            balance: balance(&tally, scene.emitted_power(), noise.rays),
-            relative_error: noise.relative_error(scene),
-            tally,
-            splits_direct_light: params.representation != Representation::Main,
-        }
+        self.sums().solution(around.scene, around.glossy, around.params.representation)
     }
 }

@@ -7,6 +7,7 @@
 
 use std::f64::consts::PI;
 
+use glam::DVec3;
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
@@ -14,10 +15,12 @@ use crate::error_bars::{Evidence, Noise, PatchNoise};
 use crate::glossy::GlossyPatches;
 use crate::params::{Params, Representation};
 use crate::patch_radiance::{Directional, Outgoing, stand_in};
+use crate::record::{GlossyRecord, RecordError, SequentialRecord};
 use crate::representative::Representative;
 use crate::select::PowerTree;
 use crate::shoot::{Far, shoot};
 use crate::solution::{GlossySolution, Solution};
+use crate::sums::cell;
 use crate::tally::Tally;
 use crate::transfer::transfer;
 use crate::waves::balance;
@@ -62,11 +65,26 @@ struct GlossyState {
     seen: u64,
 }
 
+impl GlossyState {
+    fn record(&self) -> GlossyRecord {
+        let [r, g, b] = self.main_part_n.to_array();
+        let sample = &self.representative;
+        let ([ir, ig, ib], [x, y, z]) = (sample.irradiance.to_array(), sample.wi.to_array());
+        [r, g, b, self.importance_n, ir, ig, ib, x, y, z, sample.importance, sample.rival]
+    }
+
+    fn resume(&[r, g, b, importance_n, ir, ig, ib, x, y, z, importance, rival]: &GlossyRecord) -> Self {
+        let (irradiance, wi) = (Rgb::new(ir, ig, ib), DVec3::new(x, y, z));
+        let representative = Representative { irradiance, wi, importance, rival };
+        Self { main_part_n: Rgb::new(r, g, b), importance_n, representative, ..Self::default() }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Pending {
     patch: PatchId,
     deposit: Rgb,
-    wi: glam::DVec3,
+    wi: DVec3,
     end: u64,
 }
 
@@ -82,6 +100,41 @@ impl Sequential {
             glossy: vec![GlossyState::default(); glossy.patches().len()],
             tally: Tally::default(),
             pending: Vec::new(),
+        }
+    }
+
+    /// Goes on from what was written down, whose arrays are checked and of this scene.
+    pub(crate) fn resume(
+        scene: &PatchScene,
+        glossy: &GlossyPatches,
+        record: &SequentialRecord,
+    ) -> Result<Self, RecordError> {
+        let mut this = Self::new(scene, glossy);
+        (this.n, this.updates, this.tally) = (record.rays, record.updates, record.tally);
+        this.tree.set_reflected(&record.tree);
+        let sums = record.irradiance.iter().zip(record.squares.iter()).zip(record.hits.iter());
+        for (state, ((&irradiance_n, &squares), &hits)) in this.patches.iter_mut().zip(sums) {
+            *state = PatchState { irradiance_n, evidence: Evidence { squares, hits } };
+        }
+        for (state, record) in this.glossy.iter_mut().zip(record.glossy.iter()) {
+            *state = GlossyState::resume(record);
+            // Nobody looked at these iterations: an observer's mean would miss them.
+            state.seen = this.n;
+        }
+        Ok(this)
+    }
+
+    /// Writes everything down but what an observer was sent.
+    pub(crate) fn record(&self) -> SequentialRecord<'_> {
+        SequentialRecord {
+            rays: self.n,
+            updates: self.updates,
+            tally: self.tally,
+            irradiance: self.patches.iter().map(|p| p.irradiance_n).collect(),
+            squares: self.patches.iter().map(|p| p.evidence.squares).collect(),
+            hits: self.patches.iter().map(|p| p.evidence.hits).collect(),
+            tree: self.tree.reflected().collect(),
+            glossy: self.glossy.iter().map(GlossyState::record).collect(),
         }
     }
 
@@ -105,7 +158,8 @@ impl Sequential {
     ) {
         let mut done = 0;
         while done < rays {
-            let size = batch.min(rays - done);
+            // Whole batches, whoever looks in between.
+            let size = batch;
             for k in 0..size {
                 self.ray(scene, glossy, params, self.n + k);
             }
@@ -279,22 +333,19 @@ impl Sequential {
     }
 
     pub(crate) fn relative_error(&self, scene: &PatchScene) -> f64 {
-        self.noise().relative_error(scene)
+        self.noise(scene).relative_error()
     }
 
     fn irradiance(&self, patch: PatchId) -> Rgb {
         Rgb::from_array(self.patches[patch.index()].irradiance_n) / self.n.max(1) as f64
     }
 
-    /// The paper's rays are independent, so their squares need no calibration; what noise adds by being reflected is
-    /// small beside the noise of a patch's own rays.
-    fn noise(&self) -> Noise<impl Fn(PatchId) -> PatchNoise> {
-        let of = |p: PatchId| PatchNoise {
-            irradiance: self.irradiance(p).luminance(),
-            evidence: self.patches[p.index()].evidence,
-            half_difference: None,
-        };
-        Noise { rays: self.n.max(1) as f64, of }
+    fn noise<'a>(&'a self, scene: &'a PatchScene) -> Noise<impl Fn(PatchId) -> PatchNoise + use<'a>> {
+        noise(self.n, self.patches.len(), |p| {
+            let PatchState { irradiance_n, evidence } = self.patches[p.index()];
+            let (area, emits) = cell(scene, p);
+            (area, emits, irradiance_n, evidence.squares, evidence.hits)
+        })
     }
 
     pub(crate) fn solution(&self, scene: &PatchScene, glossy: &GlossyPatches, params: &Params) -> Solution {
@@ -324,7 +375,7 @@ impl Sequential {
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&self.tally, self.emitted, n),
-            standard_error: self.noise().standard_errors(scene),
+            standard_error: self.noise(scene).standard_errors(),
             hits: self.patches.iter().map(|p| p.evidence.hits).collect(),
             relative_error: self.relative_error(scene),
             tally: self.tally,
@@ -333,8 +384,26 @@ impl Sequential {
     }
 }
 
+/// The noise of `n` iterations, from each patch's area, whether it emits, Σ I, Σ 𝓛(deposit)² and number of deposits.
+///
+/// The paper's rays are independent, so their squares need no calibration; what noise adds by being reflected is
+/// small beside the noise of a patch's own rays.
+pub(crate) fn noise<C: Fn(PatchId) -> (f64, bool, [f64; 3], f64, u32)>(
+    n: u64,
+    patches: usize,
+    cell: C,
+) -> Noise<impl Fn(PatchId) -> PatchNoise> {
+    let n = n.max(1) as f64;
+    let of = move |p: PatchId| {
+        let (area, emits, irradiance_n, squares, hits) = cell(p);
+        let irradiance = (Rgb::from_array(irradiance_n) / n).luminance();
+        PatchNoise { area, emits, irradiance, evidence: Evidence { squares, hits }, half_difference: None }
+    };
+    Noise { rays: n, patches, of }
+}
+
 /// What the display shows of a glossy patch's base: the rest is its lobe.
-fn base_radiance(scene: &PatchScene, patch: PatchId, irradiance: Rgb, eye: glam::DVec3) -> Rgb {
+fn base_radiance(scene: &PatchScene, patch: PatchId, irradiance: Rgb, eye: DVec3) -> Rgb {
     irradiance * scene.brdf(patch).base_reflectance(scene.normal(patch).dot(eye)) / PI
 }
 

@@ -137,7 +137,7 @@ impl Solution {
     /// The irradiance of all patches with its error bars, as plain arrays.
     pub fn patch_light(&self, scene: &PatchScene) -> PatchLight {
         PatchLight {
-            area: scene.patches().map(|p| scene.area(p) as f32).collect(),
+            area: scene.patches().map(|p| scene.area(p)).collect(),
             emits: scene.patches().map(|p| !scene.emission(p).is_black()).collect(),
             irradiance: self.irradiance.clone(),
             standard_error: self.standard_error.clone(),

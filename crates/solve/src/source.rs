@@ -5,6 +5,7 @@
 
 use std::f64::consts::PI;
 
+use bytemuck::{Pod, Zeroable};
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 use crate::direction;
@@ -50,9 +51,9 @@ impl Source {
 /// The one remembered sample of a glossy patch's incoming light (paper §2.1), as [`crate::representative`] explains.
 ///
 /// Of the stored irradiance only its colour counts, since its size is made C by scaling.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct PackedRepresentative {
+pub struct PackedRepresentative {
     /// Colour, its largest channel ±32767; zero before the first sample.
     colour: [i16; 3],
     /// Upper half of the bits of the l that a rival has to meet: 0.4 % fine, rounded for both rivals alike.
@@ -60,10 +61,15 @@ pub(crate) struct PackedRepresentative {
     /// Direction it came from.
     wi: u32,
     /// C, the mean of l over all rays, W·m⁻².
-    pub importance: f32,
+    pub(crate) importance: f32,
 }
 
 impl PackedRepresentative {
+    /// False of what no solve gives.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.importance.is_finite() && self.importance >= 0.0 && f32::from_bits(u32::from(self.rival) << 16) >= 0.0
+    }
+
     /// True once there is a sample.
     #[inline]
     pub(crate) fn is_there(&self) -> bool {

@@ -49,7 +49,8 @@ impl Shares {
         [self.power, self.lamps, self.area, self.patches, self.environment]
     }
 
-    fn from_array([power, lamps, area, patches, environment]: [f64; STRATEGIES]) -> Self {
+    /// From the order of the fields.
+    pub(crate) fn from_array([power, lamps, area, patches, environment]: [f64; STRATEGIES]) -> Self {
         Self { power, lamps, area, patches, environment }
     }
 }
@@ -77,11 +78,11 @@ pub(crate) struct Witness<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Known {
     /// ΣA E² of luminance.
-    energy: f64,
+    pub energy: f64,
     /// Mean irradiance, W·m⁻².
-    irradiance: f64,
+    pub irradiance: f64,
     /// Whether emitters count: only where there is nothing else.
-    emitters: bool,
+    pub emitters: bool,
 }
 
 impl Known {
@@ -138,8 +139,8 @@ const OVER_PATCHES: f64 = 1.0 / 3.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fit {
     /// Σ c d² of both errors for which each is responsible.
-    sums: [[f64; STRATEGIES]; 2],
-    witnesses: f64,
+    pub sums: [[f64; STRATEGIES]; 2],
+    pub witnesses: f64,
 }
 
 impl Fit {

@@ -2,6 +2,8 @@
 
 use twinray_scene::Rgb;
 
+use crate::record::{TALLY_WORDS, Words};
+
 /// Sums over rays, each divided by the density of the ray: the mean over rays is a power.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
@@ -22,6 +24,29 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// As words: rays, invalid deposits, and the bits of R, G, B of arrived, absorbed, escaped, lost, sky.
+    pub fn to_words(&self) -> [u64; TALLY_WORDS] {
+        let mut words = [0; TALLY_WORDS];
+        [words[0], words[1]] = [self.rays, self.invalid];
+        let sums = [self.arrived, self.absorbed, self.escaped, self.lost, self.sky];
+        words[2..].iter_mut().zip(sums.iter().flat_map(|s| s.to_array())).for_each(|(w, x)| *w = x.to_bits());
+        words
+    }
+
+    /// From [`Tally::to_words`].
+    pub fn from_words(words: [u64; TALLY_WORDS]) -> Self {
+        let mut words = Words::new(&words);
+        Self {
+            rays: words.whole(),
+            invalid: words.whole(),
+            arrived: words.color(),
+            absorbed: words.color(),
+            escaped: words.color(),
+            lost: words.color(),
+            sky: words.color(),
+        }
+    }
+
     /// Adds `other` with a weight for its sums.
     pub fn add_weighted(&mut self, other: &Tally, weight: f64) {
         self.rays += other.rays;

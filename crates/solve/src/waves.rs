@@ -10,6 +10,8 @@
 //!
 //! A solve has two of these (`replicas`), so sizes here are for half of its rays.
 
+mod record;
+
 use std::f64::consts::PI;
 
 use twinray_scene::sample::{Sobol, Stream};
@@ -89,14 +91,8 @@ pub(crate) struct Waves {
 }
 
 impl Waves {
-    /// Starts a run; the warm start is shot here.
-    pub(crate) fn new(
-        around: Surroundings,
-        seed: u64,
-        sign: f64,
-        output: &mut OutputState,
-        workspace: &mut Workspace,
-    ) -> Self {
+    /// A run that has shot nothing.
+    fn begin(around: Surroundings, seed: u64, sign: f64) -> Self {
         let scene = around.scene;
         // Bright scenes have longer memories: forget faster.
         let forgetting = if scene.mean_albedo().luminance() > 0.9 { 9.0 } else { 4.0 };
@@ -119,6 +115,18 @@ impl Waves {
             tally: Tally::default(),
         };
         this.forget_representatives(around.glossy);
+        this
+    }
+
+    /// Starts a run; the warm start is shot here.
+    pub(crate) fn new(
+        around: Surroundings,
+        seed: u64,
+        sign: f64,
+        output: &mut OutputState,
+        workspace: &mut Workspace,
+    ) -> Self {
+        let mut this = Self::begin(around, seed, sign);
         if around.params.warm_start > 0.0 {
             this.warm_start(around, output, workspace);
         }

@@ -35,6 +35,17 @@ impl PowerTree {
         }
     }
 
+    /// Reflected power × n of every node, in heap order: with the emitted powers, all that there is.
+    pub(crate) fn reflected(&self) -> impl Iterator<Item = f64> {
+        self.nodes.iter().map(|node| node[1])
+    }
+
+    /// Takes what [`PowerTree::reflected`] gave of a tree of as many patches. Leaves alone would not do: sums along the
+    /// paths have roundings of their own, and the next choice depends on them.
+    pub(crate) fn set_reflected(&mut self, reflected: &[f64]) {
+        self.nodes.iter_mut().zip(reflected).for_each(|(node, &r)| node[1] = r);
+    }
+
     /// Adds to the reflected power × n of a patch, up to the root. O(log K).
     pub fn add_reflected(&mut self, patch: usize, increment: f64) {
         let mut i = self.leaves + patch;

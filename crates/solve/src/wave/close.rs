@@ -15,7 +15,7 @@ use twinray_scene::{PatchId, PatchScene, Rgb};
 use super::deposits::{Buckets, Deposit};
 use super::{Task, Wave, WaveContext};
 use crate::direction;
-use crate::error_bars::PackedEvidence;
+use crate::error_bars::PatchEvidence;
 use crate::fixed::{FixedRgb, Units};
 use crate::glossy::GlossyPatches;
 use crate::params::Representation;
@@ -37,7 +37,7 @@ pub(crate) struct OutputState {
     /// Per patch: Σ deposits, W.
     pub deposits: Vec<[f64; 3]>,
     /// Per patch.
-    pub evidence: Vec<PackedEvidence>,
+    pub evidence: Vec<PatchEvidence>,
     /// Per glossy patch: Σ deposit · albedo(ω_in).
     pub reflected: Vec<[f32; 3]>,
     /// Per glossy patch, if there is an observer: Σ deposit · lobe(ω_in, ω_eye), of light straight from emitting patches
@@ -46,7 +46,7 @@ pub(crate) struct OutputState {
 }
 
 /// Bytes of a patch in an [`OutputState`] and in two [`SourceState`]s.
-pub(crate) const BYTES_PER_PATCH: usize = 24 + size_of::<PackedEvidence>() + 2 * size_of::<Source>();
+pub(crate) const BYTES_PER_PATCH: usize = 24 + size_of::<PatchEvidence>() + 2 * size_of::<Source>();
 /// Bytes of a glossy patch beside that, without an observer.
 pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = 12 + 2 * size_of::<PackedRepresentative>();
 /// Bytes that an observer adds to a glossy patch.
@@ -57,7 +57,7 @@ impl OutputState {
         let lobes = glossy.patches().len();
         Self {
             deposits: vec![[0.0; 3]; patches],
-            evidence: vec![PackedEvidence::default(); patches],
+            evidence: vec![PatchEvidence::default(); patches],
             reflected: vec![[0.0; 3]; lobes],
             observed: vec![[[0.0; 3]; 2]; if glossy.is_observed() { lobes } else { 0 }],
         }
@@ -66,7 +66,7 @@ impl OutputState {
     /// Begins anew.
     pub(crate) fn clear(&mut self) {
         self.deposits.fill([0.0; 3]);
-        self.evidence.fill(PackedEvidence::default());
+        self.evidence.fill(PatchEvidence::default());
         self.reflected.fill([0.0; 3]);
         self.observed.fill([[0.0; 3]; 2]);
     }
@@ -139,7 +139,7 @@ struct Part<'a> {
     sources: &'a mut [Source],
     unshot: &'a mut [Source],
     deposits: &'a mut [[f64; 3]],
-    evidence: &'a mut [PackedEvidence],
+    evidence: &'a mut [PatchEvidence],
     representatives: &'a mut [PackedRepresentative],
     reflected: &'a mut [[f32; 3]],
     observed: &'a mut [[[f32; 3]; 2]],
