@@ -9,7 +9,8 @@ use std::io;
 use twinray_format::{
     FormatError, Limits, Reading, read_picture, read_scene, read_solution, write_glb, write_obj, write_solution,
 };
-use twinray_scene::{PatchBudget, PatchOptions, PatchScene};
+use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Rgb, Surface, Texel, builtin};
+use twinray_solve::{Params, Record, Solver};
 
 /// Small enough that no input takes long; what is over them is refused as with the usual ones.
 fn limits() -> Limits {
@@ -66,13 +67,39 @@ pub fn picture(bytes: &[u8]) {
     }
 }
 
-/// A stored solution, as it is and with its checksums put right, without which no change would get any further.
+/// A stored solution, as it is and with its checksums put right, without which no change would get any further. What can
+/// be read can be written, looked at, added up, and gone on from where it is of the scene that seeds are of.
 pub fn solution(bytes: &[u8]) {
     for bytes in [bytes.to_vec(), with_checksums(bytes.to_vec())] {
         let Ok(file) = read_solution("a.twin", &bytes, &limits()) else { continue };
-        let again = read_solution("a.twin", &write_solution(&file), &Limits::default());
+        let mut written = Vec::new();
+        write_solution(&file, &mut written).expect("memory takes everything");
+        let again = read_solution("a.twin", &written, &Limits::default());
         assert_eq!(again.expect("what was written can be read"), file);
+        let Some(record) = &file.record else { continue };
+        if let Record::Waves(waves) = record {
+            twinray_solve::merge(&[(2, waves), (1, waves)]).expect("what was read can be added up");
+        }
+        let scene = lobes();
+        for params in [Params::default_preset(1), Params::paper_preset(1)] {
+            let _ = record.solution(&scene, &params);
+            if let Ok(mut solver) = Solver::resume(&scene, params, record) {
+                solver.advance(record.rays() + 1);
+                let _ = solver.solution();
+            }
+        }
     }
+}
+
+/// Two plates with a lobe, one of which shines: the scene of the solutions among the seeds.
+pub fn lobes() -> PatchScene {
+    let mut scene = builtin::plates(1.0);
+    for material in &mut scene.materials {
+        let (diffuse, specular) = (Texel::constant(Rgb::grey(0.3)), Rgb::grey(0.4));
+        material.surface = Surface::Phong { diffuse, specular, exponent: 20.0 };
+    }
+    let options = PatchOptions { budget: PatchBudget::Size(f64::INFINITY), two_sided: false };
+    PatchScene::new(&scene, options).expect("a good scene")
 }
 
 /// The container of `docs/formats.md` with the checksums that its sections and its table have.
@@ -82,13 +109,13 @@ fn with_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
         Some(part.iter().rev().fold(0, |sum, &b| sum << 8 | usize::from(b)))
     };
     let Some(sections) = number(&bytes, 12, 4).filter(|&n| n < 64) else { return bytes };
-    for at in (0..sections).map(|i| 16 + 32 * i) {
+    for at in (0..sections).map(|i| 16 + 40 * i) {
         let range = number(&bytes, at + 16, 8).zip(number(&bytes, at + 24, 8));
         let range = range.and_then(|(from, length)| Some(from..from.checked_add(length)?));
         let Some(sum) = range.and_then(|range| bytes.get(range)).map(crc) else { continue };
         bytes[at + 12..at + 16].copy_from_slice(&sum.to_le_bytes());
     }
-    let end = 16 + 32 * sections;
+    let end = 16 + 40 * sections;
     if bytes.len() >= end + 8 {
         let sum = u64::from(crc(&bytes[..end]));
         bytes[end..end + 8].copy_from_slice(&sum.to_le_bytes());

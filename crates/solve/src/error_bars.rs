@@ -11,7 +11,6 @@
 //! Not here: bias. What there is of it stands in `docs/paper.md`: the loss of the paper's 1/n average, and a far smaller
 //! one of the default preset's low-discrepancy numbers.
 
-use bytemuck::{Pod, Zeroable};
 use twinray_scene::PatchId;
 
 /// What a patch's error bar is made from. Sums over rays with equal weights.
@@ -24,9 +23,9 @@ pub(crate) struct Evidence {
 }
 
 /// The evidence of two replicas on one patch. Entered once a wave, so that single precision does not stall.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
-pub struct PatchEvidence {
+pub(crate) struct PatchEvidence {
     /// Σ 𝓛(deposit)² of both, W².
     pub squares: f32,
     /// Σ 𝓛(deposit) of the first minus that of the second, W.

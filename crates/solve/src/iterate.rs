@@ -65,7 +65,7 @@ impl<'a> Solver<'a> {
         check(scene, &params)?;
         record.check()?;
         let glossy = GlossyPatches::new(scene, None);
-        record.check_lengths(scene.len(), glossy.patches().len())?;
+        record.check_belongs(scene, &glossy)?;
         let state = match (params.schedule, record) {
             (Schedule::Waves, Record::Waves(waves)) => {
                 let around = Surroundings { scene, glossy: &glossy, params: &params, lap: &|_| () };
@@ -83,8 +83,8 @@ impl<'a> Solver<'a> {
     /// Everything that decides how the solve goes on, but for what an observer was sent. O(K).
     pub fn record(&self) -> Record<'_> {
         match &self.state {
-            State::Sequential(s, _) => Record::Sequential(s.record()),
-            State::Waves(w) => Record::Waves(w.record()),
+            State::Sequential(s, _) => Record::Sequential(s.record(&self.glossy)),
+            State::Waves(w) => Record::Waves(w.record(&self.glossy)),
         }
     }
 

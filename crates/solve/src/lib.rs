@@ -41,7 +41,6 @@ pub mod transfer;
 mod wave;
 mod waves;
 
-pub use error_bars::PatchEvidence;
 pub use iterate::{Solver, state_bytes};
 pub use merge::merge;
 pub use observer::Observer;

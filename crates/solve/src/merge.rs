@@ -7,7 +7,6 @@ use std::borrow::Cow;
 
 use twinray_scene::sample::Stream;
 
-use crate::error_bars::PatchEvidence;
 use crate::record::{RecordError, WavesRecord};
 use crate::source::PackedRepresentative;
 use crate::tally::Tally;
@@ -30,32 +29,33 @@ pub fn merge(parts: &[(u64, &WavesRecord)]) -> Result<WavesRecord<'static>, Reco
         part.check()?;
         for (array, found, expected) in [
             ("deposits", part.deposits.len(), first.deposits.len()),
-            ("reflected", part.reflected.len(), first.reflected.len()),
+            ("glossy", part.glossy.len(), first.glossy.len()),
         ] {
             if found != expected {
                 return Err(RecordError::Length { array, found, expected });
             }
         }
     }
+    let (patches, lobes) = (|| 0..first.deposits.len(), || 0..first.glossy.len());
     let weight: f64 = parts.iter().map(|(_, part)| part.weight).sum();
     let mut tally = Tally::default();
     parts.iter().for_each(|(_, part)| tally.add_weighted(&part.tally, 1.0));
     let sum = |of: &dyn Fn(&WavesRecord) -> f64| parts.iter().map(|(_, part)| of(part)).sum::<f64>();
-    let evidence = |k: usize| PatchEvidence {
-        squares: sum(&|part| part.evidence[k].squares.into()) as f32,
-        // The variance of a sum is the sum of variances, each of which one difference tells.
-        difference: sum(&|part| f64::from(part.evidence[k].difference).powi(2)).sqrt() as f32,
-        hits: parts.iter().fold(0, |hits: u32, (_, part)| hits.saturating_add(part.evidence[k].hits)),
-    };
+    // The variance of a sum is the sum of variances, each of which one difference tells.
+    let difference = |k: usize| sum(&|part| f64::from(part.difference[k]).powi(2)).sqrt() as f32;
+    let hits = |k: usize| parts.iter().fold(0, |hits: u32, (_, part)| hits.saturating_add(part.hits[k]));
     let colors = |k: usize| std::array::from_fn(|c| sum(&|part| part.reflected[k][c].into()) as f32);
     Ok(WavesRecord {
         rays: parts.iter().map(|(_, part)| part.rays).sum(),
         weight,
         tally,
-        deposits: (0..first.deposits.len()).map(|k| std::array::from_fn(|c| sum(&|part| part.deposits[k][c]))).collect(),
-        evidence: (0..first.deposits.len()).map(evidence).collect(),
-        reflected: (0..first.reflected.len()).map(colors).collect(),
-        representatives: Cow::Owned((0..first.reflected.len()).map(|k| representative(&parts, k, weight)).collect()),
+        deposits: patches().map(|k| std::array::from_fn(|c| sum(&|part| part.deposits[k][c]))).collect(),
+        squares: patches().map(|k| sum(&|part| part.squares[k].into()) as f32).collect(),
+        difference: patches().map(difference).collect(),
+        hits: patches().map(hits).collect(),
+        glossy: Cow::Owned(first.glossy.to_vec()),
+        reflected: lobes().map(colors).collect(),
+        representatives: lobes().map(|k| representative(&parts, k, weight)).collect(),
         runs: None,
     })
 }

@@ -7,14 +7,13 @@ use std::borrow::Cow;
 
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use crate::error_bars::PatchEvidence;
 use crate::glossy::GlossyPatches;
 use crate::params::Params;
 use crate::patch_light::PatchLight;
 use crate::sequential::{self, Sequential};
 use crate::solution::Solution;
 use crate::source::PackedRepresentative;
-use crate::sums::Sums;
+use crate::sums::{PatchEvidences, Sums};
 use crate::tally::Tally;
 
 /// More rays than anybody can shoot; up to here no sum of counts overflows.
@@ -40,8 +39,15 @@ pub struct WavesRecord<'a> {
     pub tally: Tally,
     /// `[K]`: Σ deposits, R, G, B, W. Divided by weight and area they are irradiance.
     pub deposits: Cow<'a, [[f64; 3]]>,
-    /// `[K]`: what error bars are made from.
-    pub evidence: Cow<'a, [PatchEvidence]>,
+    /// `[K]`: Σ 𝓛(deposit)², W².
+    pub squares: Cow<'a, [f32]>,
+    /// `[K]`: Σ 𝓛(deposit) of the first replica minus that of the second, W; of solves that were added up the root of the sum
+    /// of squares of theirs.
+    pub difference: Cow<'a, [f32]>,
+    /// `[K]`: number of deposits.
+    pub hits: Cow<'a, [u32]>,
+    /// `[G]`: which patches are glossy, in order.
+    pub glossy: Cow<'a, [u32]>,
     /// `[G]`: Σ deposit · albedo(ω_in), W. Divided by π, weight and area it is the main part of the reflected radiance.
     pub reflected: Cow<'a, [[f32; 3]]>,
     /// `[G]`: the remembered samples, of the first replica or of one of the solves that were added up.
@@ -78,8 +84,10 @@ pub struct SequentialRecord<'a> {
     pub hits: Cow<'a, [u32]>,
     /// Reflected power × n of every node of the power tree, W, in heap order; paper §2.2.
     pub tree: Cow<'a, [f64]>,
-    /// `[G]`: what glossy patches remember.
-    pub glossy: Cow<'a, [GlossyRecord]>,
+    /// `[G]`: which patches are glossy, in order.
+    pub glossy: Cow<'a, [u32]>,
+    /// `[G]`: what they remember.
+    pub memory: Cow<'a, [GlossyRecord]>,
 }
 
 /// A glossy patch of the paper's schedule: Σ I·a/π (R, G, B), Σ l, the stored sample's I(m) (R, G, B), ω_m (x, y, z), l and its
@@ -146,7 +154,7 @@ impl Record<'_> {
     /// Glossy patches, G.
     pub fn glossy(&self) -> usize {
         match self {
-            Record::Waves(waves) => waves.reflected.len(),
+            Record::Waves(waves) => waves.glossy.len(),
             Record::Sequential(sequential) => sequential.glossy.len(),
         }
     }
@@ -177,7 +185,7 @@ impl Record<'_> {
     pub fn solution(&self, scene: &PatchScene, params: &Params) -> Result<Solution, RecordError> {
         self.check()?;
         let glossy = GlossyPatches::new(scene, None);
-        self.check_lengths(scene.len(), glossy.patches().len())?;
+        self.check_belongs(scene, &glossy)?;
         match self {
             Record::Waves(waves) => Ok(waves.sums().solution(scene, &glossy, params.representation)),
             Record::Sequential(sequential) => {
@@ -198,10 +206,16 @@ impl Record<'_> {
         }
     }
 
-    pub(crate) fn check_lengths(&self, patches: usize, glossy: usize) -> Result<(), RecordError> {
-        let first = if matches!(self, Record::Waves(_)) { "deposits" } else { "irradiance" };
-        length(first, self.patches(), patches)?;
-        length("glossy patches", self.glossy(), glossy)
+    pub(crate) fn check_belongs(&self, scene: &PatchScene, glossy: &GlossyPatches) -> Result<(), RecordError> {
+        let (first, numbers) = match self {
+            Record::Waves(waves) => ("deposits", &waves.glossy),
+            Record::Sequential(sequential) => ("irradiance", &sequential.glossy),
+        };
+        length(first, self.patches(), scene.len())?;
+        length("glossy", self.glossy(), glossy.patches().len())?;
+        let index = numbers.iter().zip(glossy.patches()).position(|(k, p)| *k != p.0);
+        let expected = "the numbers of the scene's glossy patches";
+        index.map_or(Ok(()), |k| Err(RecordError::Value { array: "glossy", index: Some(k), expected }))
     }
 }
 
@@ -212,7 +226,7 @@ impl<'a> WavesRecord<'a> {
             weight: self.weight,
             tally: self.tally,
             deposits: &self.deposits,
-            evidence: &self.evidence,
+            evidence: PatchEvidences::Apart(&self.squares, &self.difference, &self.hits),
             reflected: &self.reflected,
             observed: &[],
             representatives: &self.representatives,
@@ -227,34 +241,36 @@ impl<'a> WavesRecord<'a> {
             let noise = sums.noise(|p| (area[p.index()], emits[p.index()]));
             (noise.standard_errors(), noise.relative_error())
         };
-        let hits = self.evidence.iter().map(|e| e.hits).collect();
-        (PatchLight { area, emits, irradiance, standard_error, hits }, relative_error)
+        (PatchLight { area, emits, irradiance, standard_error, hits: self.hits.to_vec() }, relative_error)
     }
 
     pub(crate) fn check(&self) -> Result<(), RecordError> {
-        let (patches, glossy) = (self.deposits.len(), self.reflected.len());
+        let (patches, glossy) = (self.deposits.len(), self.glossy.len());
         number("rays", self.rays <= MOST_RAYS, "at most 2^56")?;
         number("weight", self.weight > 0.0 && self.weight.is_finite(), "a positive number")?;
         number("tally", is_finite(&self.tally), FINITE)?;
-        length("evidence", self.evidence.len(), patches)?;
-        length("representatives", self.representatives.len(), glossy)?;
+        length("squares", self.squares.len(), patches)?;
+        length("difference", self.difference.len(), patches)?;
+        length("hits", self.hits.len(), patches)?;
+        length("reflected", self.reflected.len(), glossy)?;
+        length("sample-0", self.representatives.len(), glossy)?;
         // The directional part may take away what the main part gave too much: sums may be negative.
         values("deposits", &self.deposits, |d| d.iter().all(|x| x.is_finite()), FINITE)?;
-        let evidence = |e: &PatchEvidence| e.squares.is_finite() && e.squares >= 0.0 && e.difference.is_finite();
-        values("evidence", &self.evidence, evidence, POSITIVE)?;
+        values("squares", &self.squares, |x| x.is_finite() && *x >= 0.0, POSITIVE)?;
+        values("difference", &self.difference, |x| x.is_finite(), FINITE)?;
         values("reflected", &self.reflected, |r| r.iter().all(|x| x.is_finite()), FINITE)?;
-        values("representatives", &self.representatives, PackedRepresentative::is_sound, FINITE)?;
+        values("sample-0", &self.representatives, PackedRepresentative::is_sound, FINITE)?;
         for (run, (words, radiance)) in
-            self.runs.iter().flatten().zip([("words-0", "radiance-0"), ("words-1", "radiance-1")])
+            self.runs.iter().flatten().zip([("run-0", "radiance-0"), ("run-1", "radiance-1")])
         {
             number(words, run.words[0] <= MOST_RAYS, "at most 2^56 rays")?;
             length(radiance, run.radiance.len(), patches)?;
             values(radiance, &run.radiance, |r| r.iter().all(|x| x.is_finite()), FINITE)?;
         }
         if let Some([first, second]) = &self.runs {
-            length("representatives", first.representatives.len(), 0)?;
-            length("representatives-1", second.representatives.len(), glossy)?;
-            values("representatives-1", &second.representatives, PackedRepresentative::is_sound, FINITE)?;
+            length("sample-0 of the first run", first.representatives.len(), 0)?;
+            length("sample-1", second.representatives.len(), glossy)?;
+            values("sample-1", &second.representatives, PackedRepresentative::is_sound, FINITE)?;
         }
         Ok(())
     }
@@ -268,10 +284,11 @@ impl SequentialRecord<'_> {
         length("squares", self.squares.len(), patches)?;
         length("hits", self.hits.len(), patches)?;
         length("tree", self.tree.len(), 2 * patches.next_power_of_two())?;
+        length("memory", self.memory.len(), self.glossy.len())?;
         values("irradiance", &self.irradiance, |i| i.iter().all(|x| x.is_finite()), FINITE)?;
         values("squares", &self.squares, |x| x.is_finite() && *x >= 0.0, POSITIVE)?;
         values("tree", &self.tree, |x| x.is_finite(), FINITE)?;
-        values("glossy", &self.glossy, |g| g.iter().all(|x| x.is_finite()), FINITE)
+        values("memory", &self.memory, |g| g.iter().all(|x| x.is_finite()), FINITE)
     }
 
     fn light(&self, area: Vec<f64>, emits: Vec<bool>) -> (PatchLight, f64) {

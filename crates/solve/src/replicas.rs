@@ -9,10 +9,11 @@ use std::borrow::Cow;
 use twinray_scene::PatchScene;
 use twinray_scene::sample::Stream;
 
+use crate::glossy::GlossyPatches;
 use crate::record::{RecordError, RunRecord, WavesRecord};
 use crate::solution::Solution;
 use crate::strategies::Shares;
-use crate::sums::Sums;
+use crate::sums::{PatchEvidences, Sums};
 use crate::tally::Tally;
 use crate::wave::OutputState;
 use crate::waves::{Surroundings, Waves, Workspace};
@@ -49,7 +50,8 @@ impl Replicas {
         let runs = [run(0, first, &record.representatives)?, run(1, second, &second.representatives)?];
         let mut output = OutputState::new(around.scene.len(), around.glossy);
         output.deposits.copy_from_slice(&record.deposits);
-        output.evidence.copy_from_slice(&record.evidence);
+        let evidence = record.sums().evidence;
+        (output.evidence.iter_mut().zip(around.scene.patches())).for_each(|(e, p)| *e = evidence.of(p));
         output.reflected.copy_from_slice(&record.reflected);
         Ok(Self { runs, output, workspace: Workspace::default() })
     }
@@ -60,7 +62,7 @@ impl Replicas {
     }
 
     /// Writes everything down but what an observer was sent.
-    pub(crate) fn record(&self) -> WavesRecord<'_> {
+    pub(crate) fn record(&self, glossy: &GlossyPatches) -> WavesRecord<'_> {
         let sums = self.sums();
         let [first, mut second] = [0, 1].map(|k| self.runs[k].record());
         second.representatives = Cow::Borrowed(self.runs[1].representatives());
@@ -69,7 +71,10 @@ impl Replicas {
             weight: sums.weight,
             tally: sums.tally,
             deposits: Cow::Borrowed(sums.deposits),
-            evidence: Cow::Borrowed(sums.evidence),
+            squares: self.output.evidence.iter().map(|e| e.squares).collect(),
+            difference: self.output.evidence.iter().map(|e| e.difference).collect(),
+            hits: self.output.evidence.iter().map(|e| e.hits).collect(),
+            glossy: glossy.patches().iter().map(|p| p.0).collect(),
             reflected: Cow::Borrowed(sums.reflected),
             representatives: Cow::Borrowed(sums.representatives),
             runs: Some([first, second]),
@@ -115,7 +120,7 @@ impl Replicas {
             weight: self.runs.iter().map(Waves::weight).sum(),
             tally,
             deposits: &self.output.deposits,
-            evidence: &self.output.evidence,
+            evidence: PatchEvidences::Together(&self.output.evidence),
             reflected: &self.output.reflected,
             observed: &self.output.observed,
             representatives: self.runs[0].representatives(),

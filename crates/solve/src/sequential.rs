@@ -116,7 +116,7 @@ impl Sequential {
         for (state, ((&irradiance_n, &squares), &hits)) in this.patches.iter_mut().zip(sums) {
             *state = PatchState { irradiance_n, evidence: Evidence { squares, hits } };
         }
-        for (state, record) in this.glossy.iter_mut().zip(record.glossy.iter()) {
+        for (state, record) in this.glossy.iter_mut().zip(record.memory.iter()) {
             *state = GlossyState::resume(record);
             // Nobody looked at these iterations: an observer's mean would miss them.
             state.seen = this.n;
@@ -125,7 +125,7 @@ impl Sequential {
     }
 
     /// Writes everything down but what an observer was sent.
-    pub(crate) fn record(&self) -> SequentialRecord<'_> {
+    pub(crate) fn record(&self, glossy: &GlossyPatches) -> SequentialRecord<'_> {
         SequentialRecord {
             rays: self.n,
             updates: self.updates,
@@ -134,7 +134,8 @@ impl Sequential {
             squares: self.patches.iter().map(|p| p.evidence.squares).collect(),
             hits: self.patches.iter().map(|p| p.evidence.hits).collect(),
             tree: self.tree.reflected().collect(),
-            glossy: self.glossy.iter().map(GlossyState::record).collect(),
+            glossy: glossy.patches().iter().map(|p| p.0).collect(),
+            memory: self.glossy.iter().map(GlossyState::record).collect(),
         }
     }
 

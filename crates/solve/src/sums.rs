@@ -22,13 +22,35 @@ pub(crate) struct Sums<'a> {
     pub tally: Tally,
     /// Σ deposits, W.
     pub deposits: &'a [[f64; 3]],
-    pub evidence: &'a [PatchEvidence],
+    pub evidence: PatchEvidences<'a>,
     /// `[glossy patches]`: Σ deposit · albedo(ω_in), W.
     pub reflected: &'a [[f32; 3]],
     /// `[glossy patches]`, or empty: what an observer was sent.
     pub observed: &'a [[[f32; 3]; 2]],
     /// `[glossy patches]`.
     pub representatives: &'a [PackedRepresentative],
+}
+
+/// The evidence of all patches, as whoever holds it keeps it.
+#[derive(Clone, Copy)]
+pub(crate) enum PatchEvidences<'a> {
+    /// Patch by patch, as a solver does.
+    Together(&'a [PatchEvidence]),
+    /// Apart: squares, differences, hits, as in a record.
+    Apart(&'a [f32], &'a [f32], &'a [u32]),
+}
+
+impl PatchEvidences<'_> {
+    #[inline]
+    pub(crate) fn of(&self, patch: PatchId) -> PatchEvidence {
+        let k = patch.index();
+        match self {
+            Self::Together(evidence) => evidence[k],
+            Self::Apart(squares, difference, hits) => {
+                PatchEvidence { squares: squares[k], difference: difference[k], hits: hits[k] }
+            }
+        }
+    }
 }
 
 impl<'a> Sums<'a> {
@@ -45,7 +67,7 @@ impl<'a> Sums<'a> {
     ) -> Noise<impl Fn(PatchId) -> PatchNoise + use<'a, C>> {
         let of = move |p: PatchId| {
             let (area, emits) = cell(p);
-            let evidence = self.evidence[p.index()];
+            let evidence = self.evidence.of(p);
             PatchNoise {
                 area,
                 emits,
@@ -85,7 +107,7 @@ impl<'a> Sums<'a> {
             rays: self.rays,
             irradiance: scene.patches().map(|p| self.irradiance(p, scene.area(p)).to_f32()).collect(),
             standard_error: noise.standard_errors(),
-            hits: self.evidence.iter().map(|e| e.hits).collect(),
+            hits: scene.patches().map(|p| self.evidence.of(p).hits).collect(),
             glossy: glossy.clone(),
             glossy_light,
             balance: balance(&self.tally, scene.emitted_power(), noise.rays),

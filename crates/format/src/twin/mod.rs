@@ -1,25 +1,32 @@
-//! Solutions as files: the light of the patches with where it comes from.
+//! Solutions as files: the light of the patches, where it comes from, and what it takes to go on.
 //!
-//! Lives here: the types, and what each section of a `.twin` file means ([`write`], [`read`]); `sections` is the
-//! container, which knows names and checksums only. Not here: how the light was found. The layout is described for
-//! other programs in `docs/formats.md`.
+//! Lives here: the types, and what each section of a `.twin` file means ([`write_solution`], [`StoredSolution`]);
+//! `sections` is the container, which knows names, kinds and checksums only. Not here: how the light was found. The layout
+//! is described for other programs in `docs/formats.md`.
 
+mod header;
 mod read;
 mod sections;
 mod write;
 
-use twinray_solve::PatchLight;
+use twinray_solve::{PatchLight, Record};
 
-pub use read::read_solution;
+pub use read::{StoredSolution, read_solution};
 pub use write::write_solution;
 
-/// The light of a scene's patches and where it comes from.
+// Arrays are written and mapped as they lie in memory.
+#[cfg(target_endian = "big")]
+compile_error!("`.twin` files are little-endian, and this processor is not");
+
+/// A solution as a whole.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SolutionFile {
+pub struct SolutionFile<'a> {
     /// Where the light comes from.
     pub provenance: Provenance,
     /// The light. Arrays are `[patches]`, in the order of the scene's patches.
     pub light: PatchLight,
+    /// What it takes to go on, to take pictures or to add other solves; `None` of a reference.
+    pub record: Option<Record<'a>>,
 }
 
 /// What made a solution, and of which scene: enough to make it again.
@@ -31,17 +38,38 @@ pub struct Provenance {
     pub method: Method,
     /// Name of the scene, for messages.
     pub scene: String,
+    /// Where the scene is and how it was cut.
+    pub source: SceneSource,
     /// `PatchScene::fingerprint` of the scene: light of two solutions compares patch by patch only where it agrees.
     pub fingerprint: u64,
     /// Rays shot, or paths of a reference.
     pub rays: u64,
-    /// Seed of every random number.
+    /// Seed that the user gave.
     pub seed: u64,
+    /// Which of how many parts this is, counted from 1; such have seeds of their own.
+    pub part: Option<[u32; 2]>,
+    /// Seeds that random numbers were made from, of all solves that were added up; ascending.
+    pub seeds: Vec<u64>,
     /// Settings in words, such as `("preset", "default")`, in the order in which they are to be read.
     pub settings: Vec<(String, String)>,
     /// Relative RMS error that the method claims, √(ΣA ΔE²/ΣA E²) of luminance without emitters; infinite where it
     /// claims nothing.
     pub relative_error: f32,
+}
+
+/// Where a scene is, and how it was cut into patches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneSource {
+    /// Name of a built-in scene, or path of a file as seen from the solution's folder, with `/` between folders.
+    pub file: String,
+    /// Metres of the file's unit of length.
+    pub metres_per_unit: f64,
+    /// Number of patches that was aimed at, or what the scene suggests.
+    pub patches: Option<u64>,
+    /// Side of a patch that was asked for instead, m; infinite for one patch per triangle.
+    pub patch_size: Option<f64>,
+    /// Whether every surface counts as two-sided.
+    pub two_sided: bool,
 }
 
 /// Ways to find the light of a scene.
@@ -63,10 +91,8 @@ impl Method {
     }
 }
 
-/// Names of the sections, and the bytes that one patch takes in each.
+/// Names of sections that more than one file of this folder speaks of.
 const HEADER: &str = "header";
-const AREA: (&str, usize) = ("area", 4);
-const EMITS: (&str, usize) = ("emits", 1);
-const IRRADIANCE: (&str, usize) = ("irradiance", 12);
-const STANDARD_ERROR: (&str, usize) = ("error", 4);
-const HITS: (&str, usize) = ("hits", 4);
+const AREA: &str = "area";
+const EMITS: &str = "emits";
+const STANDARD_ERROR: &str = "error";

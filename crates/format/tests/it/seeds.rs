@@ -6,14 +6,16 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use twinray_format::{write_exr, write_glb, write_obj, write_solution};
+use twinray_format::{write_exr, write_glb, write_obj};
 use twinray_scene::{Rgb, builtin};
+use twinray_solve::Params;
 
 use crate::real::files_below;
 use crate::support::{Doc, png};
+use crate::twin;
 
 #[path = "../../../../fuzz/bodies.rs"]
-mod bodies;
+pub mod bodies;
 
 type Body = fn(&[u8]);
 
@@ -67,7 +69,10 @@ fn seeds() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         ("texture", "dot.tga", tga),
         ("picture", "stripe.png", png(&[[200, 100, 50]; 5])),
         ("picture", "dots.exr", exr),
-        ("solution", "three.twin", write_solution(&crate::twin::small())),
+        ("solution", "three.twin", twin::write(&twin::small())),
+        ("solution", "waves.twin", twin::write(&twin::solved(&Params::default_preset(1), false))),
+        ("solution", "merged.twin", twin::write(&twin::solved(&Params::default_preset(1), true))),
+        ("solution", "paper.twin", twin::write(&twin::solved(&Params::paper_preset(1), false))),
     ]
 }
 

@@ -80,7 +80,7 @@ pub fn solutions(test: &PatchLight, reference: &PatchLight) -> LightDifference {
     let mut differences = Vec::new();
     let mut scores = Vec::new();
     for patch in (0..reference.len()).filter(|&k| !reference.emits[k]) {
-        let area = f64::from(reference.area[patch]);
+        let area = reference.area[patch];
         let [a, b] = [test, reference].map(|light| Rgb::from_f32(light.irradiance[patch]).luminance());
         let [error_a, error_b] = [test, reference].map(|light| f64::from(light.standard_error[patch]));
         let variance = error_a * error_a + error_b * error_b;
@@ -165,7 +165,7 @@ mod tests {
 
     fn light(values: &[(f32, f32, f32)]) -> PatchLight {
         PatchLight {
-            area: values.iter().map(|v| v.0).collect(),
+            area: values.iter().map(|v| v.0.into()).collect(),
             emits: vec![false; values.len()],
             irradiance: values.iter().map(|v| [v.1; 3]).collect(),
             standard_error: values.iter().map(|v| v.2).collect(),

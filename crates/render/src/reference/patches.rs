@@ -69,7 +69,7 @@ impl<'a> PatchTracer<'a> {
         let scene = self.tracer.scene;
         let n = f64::from(self.paths.max(1));
         PatchLight {
-            area: scene.patches().map(|p| scene.area(p) as f32).collect(),
+            area: scene.patches().map(|p| scene.area(p)).collect(),
             emits: scene.patches().map(|p| !scene.emission(p).is_black()).collect(),
             irradiance: self.sums.iter().map(|s| (s.irradiance / n).to_f32()).collect(),
             standard_error: self.sums.iter().map(|s| s.variance(self.paths).sqrt() as f32).collect(),

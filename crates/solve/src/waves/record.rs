@@ -34,7 +34,7 @@ impl Waves {
             || !((sum - 1.0).abs() < 1e-6 && this.wave <= MOST_RAYS)
         {
             let expected = "weights of at least 0, and shares that are 1 together";
-            return Err(RecordError::Value { array: "words", index: None, expected });
+            return Err(RecordError::Value { array: "run-0 or run-1", index: None, expected });
         }
         for (source, radiance) in this.source.sources.iter_mut().zip(record.radiance.iter()) {
             source.constant = *radiance;
