@@ -10,7 +10,9 @@ use clap::{Parser, Subcommand, ValueEnum};
 #[command(after_help = "SCENE is a .glb, .gltf or .obj file, or a built-in scene: \
     furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse, \
     uneven, uneven-glowing.\n\
-    Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 interrupted with the result kept.")]
+    A .twin file, the light of a scene as `solve` keeps it, stands for its scene.\n\
+    Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 (Ctrl-C) or 143 (SIGTERM) interrupted with \
+    the result kept.")]
 pub struct Args {
     /// What to do.
     #[command(subcommand)]
@@ -20,10 +22,12 @@ pub struct Args {
 /// Verbs, in the order light is computed.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Solve a scene and take a picture of it
+    /// Solve a scene and take a picture of it, or take one of a .twin file's light
     Render(RenderArgs),
-    /// Solve a scene and keep the light of its patches in a file
+    /// Solve a scene and keep the light of its patches in a .twin file, or go on with one
     Solve(SolutionArgs),
+    /// Add up solves of one scene that were made with different seeds or as parts
+    Merge(MergeArgs),
     /// Trace the irradiance of every patch by paths, slowly and without bias, to compare solutions with
     Reference(ReferenceArgs),
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
@@ -37,8 +41,12 @@ pub enum Command {
 /// How a scene is loaded and cut.
 #[derive(Debug, clap::Args)]
 pub struct LoadArgs {
-    /// A .glb, .gltf or .obj file, or the name of a built-in scene
+    /// A .glb, .gltf or .obj file, the name of a built-in scene, or a .twin file
+    #[arg(value_name = "SCENE")]
     pub scene: String,
+    /// Where the scene of a .twin file is now [default: where it was, as seen from the file]
+    #[arg(long, value_name = "FILE")]
+    pub scene_file: Option<String>,
     /// Number of patches to aim at, distributed by area [default: 100000, or what a built-in scene suggests]
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "patch_size")]
     pub patches: Option<u64>,
@@ -48,9 +56,9 @@ pub struct LoadArgs {
     /// Treat every surface as two-sided
     #[arg(long)]
     pub two_sided: bool,
-    /// Unit of the file's lengths
-    #[arg(long, value_enum, default_value = "m")]
-    pub unit: Unit,
+    /// Unit of the file's lengths [default: m]
+    #[arg(long, value_enum)]
+    pub unit: Option<Unit>,
     /// Threads [default: all]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -63,13 +71,14 @@ pub struct LoadArgs {
 }
 
 /// Units of length.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub enum Unit {
     /// Millimetres.
     Mm,
     /// Centimetres.
     Cm,
     /// Metres.
+    #[default]
     M,
 }
 
@@ -116,34 +125,35 @@ pub struct SolveArgs {
     /// Shoot until the estimated error is below this, such as 2%: relative RMS of patch irradiance, weighted by area
     #[arg(long, value_name = "PERCENT", value_parser = share, allow_hyphen_values = true)]
     pub error: Option<f64>,
-    /// Seed of every random number
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// default: ours; paper: Kelemen et al. 2003, one ray per iteration, corrected as docs/paper.md says
-    #[arg(long, value_enum, default_value = "default")]
-    pub preset: Preset,
-    /// Which of a ray's two transfers count, and how
-    #[arg(long, value_enum, default_value = "balance")]
-    pub estimator: EstimatorArg,
-    /// What glossy patches remember of the direction of light
-    #[arg(long, value_enum, default_value = "both")]
-    pub representation: RepresentationArg,
-    /// Rays per iteration of the paper preset
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), default_value_t = 1)]
-    pub batch: u64,
+    /// Seed of every random number [default: 1]
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// default: ours; paper: Kelemen et al. 2003, one ray per iteration, corrected as docs/paper.md says [default: default]
+    #[arg(long, value_enum)]
+    pub preset: Option<Preset>,
+    /// Which of a ray's two transfers count, and how [default: balance]
+    #[arg(long, value_enum)]
+    pub estimator: Option<EstimatorArg>,
+    /// What glossy patches remember of the direction of light [default: both]
+    #[arg(long, value_enum)]
+    pub representation: Option<RepresentationArg>,
+    /// Rays per iteration of the paper preset [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub batch: Option<u64>,
 }
 
 /// Presets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Preset {
     /// Ours.
+    #[default]
     Default,
     /// The paper's.
     Paper,
 }
 
 /// Estimators.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum EstimatorArg {
     /// From the shooter to the hit only.
     Forward,
@@ -152,17 +162,19 @@ pub enum EstimatorArg {
     /// Both with half the weight.
     Equal,
     /// Both by the balance heuristic.
+    #[default]
     Balance,
 }
 
 /// Representations.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum RepresentationArg {
     /// Direction-independent main part.
     Main,
     /// One accepted sample.
     Sample,
     /// Main part and one accepted sample of the difference BRDF.
+    #[default]
     Both,
     /// Main part and the last sample, always accepted.
     Last,
@@ -232,10 +244,37 @@ pub struct SolutionArgs {
     /// Solver.
     #[command(flatten)]
     pub solve: SolveArgs,
-    /// Solution to write: .twin [default: SCENE.twin in this folder]
+    /// Solution to write: .twin [default: SCENE.twin in this folder; of a .twin file, the file itself]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// How often to write what there is, such as 60s, 10m, 2h or never: what a crash can cost
+    #[arg(long, value_name = "INTERVAL", default_value = "60s", value_parser = interval)]
+    pub checkpoint: Interval,
+    /// Solve one of N parts, with random numbers and a share of the rays of its own, for `merge` to add up
+    #[arg(long, value_name = "K/N", value_parser = part)]
+    pub part: Option<[u32; 2]>,
 }
+
+/// `twinray merge`.
+#[derive(Debug, clap::Args)]
+pub struct MergeArgs {
+    /// Solutions to add up: .twin files of one scene, solved with the same settings
+    #[arg(value_name = "FILE", required = true, num_args = 1..)]
+    pub files: Vec<String>,
+    /// Solution to write: .twin
+    #[arg(long, short, value_name = "FILE", required = true)]
+    pub output: PathBuf,
+    /// Say nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Seconds between two checkpoints; `None` for never.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval(pub Option<f64>);
 
 /// Reflections.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -377,6 +416,29 @@ fn count(text: &str) -> Result<u64, String> {
     if (1.0..=1e15).contains(&value) { Ok(value.round() as u64) } else { Err("expected 1 to 1e15".into()) }
 }
 
+/// A time such as 60s, 10m, 2h or 90; or never.
+fn interval(text: &str) -> Result<Interval, String> {
+    if text == "never" {
+        return Ok(Interval(None));
+    }
+    let (digits, unit) = match text.char_indices().last() {
+        Some((i, 's')) => (&text[..i], 1.0),
+        Some((i, 'm')) => (&text[..i], 60.0),
+        Some((i, 'h')) => (&text[..i], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = digits.trim().parse().ok().map(|x: f64| x * unit).filter(|x| *x > 0.0 && x.is_finite());
+    let seconds = seconds.ok_or("expected a time such as 60s, 10m or 2h, or never")?;
+    Ok(Interval(Some(seconds)))
+}
+
+/// Which of how many parts, such as 3/16.
+fn part(text: &str) -> Result<[u32; 2], String> {
+    let numbers = text.split_once('/').and_then(|(k, n)| Some([k.trim().parse().ok()?, n.trim().parse().ok()?]));
+    let good = numbers.filter(|[k, n]: &[u32; 2]| (1..=*n).contains(k));
+    good.ok_or_else(|| "expected which of how many, such as 3/16, counted from 1".into())
+}
+
 fn seconds(text: &str) -> Result<f64, String> {
     let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && s.is_finite());
     seconds.ok_or_else(|| "expected a positive number of seconds".into())
@@ -445,6 +507,12 @@ mod tests {
         assert_eq!(max_error("2%").map(MaxError::text), Ok("2%".into()));
         assert_eq!(max_error("40"), Ok(MaxError { value: 40.0, percent: false }));
         assert!(["-1", "nan", "inf", "%", "2 %%"].iter().all(|text| max_error(text).is_err()));
+        assert_eq!(interval("2h"), Ok(Interval(Some(7200.0))));
+        assert_eq!(interval("0.5"), Ok(Interval(Some(0.5))));
+        assert_eq!(interval("never"), Ok(Interval(None)));
+        assert!(["0s", "-1", "s", "soon", ""].iter().all(|text| interval(text).is_err()));
+        assert_eq!(part("3/16"), Ok([3, 16]));
+        assert!(["0/4", "5/4", "4", "a/b", "-1/2"].iter().all(|text| part(text).is_err()));
         assert!(triple("1,2").is_err() && triple("1,2,nan").is_err());
     }
 }

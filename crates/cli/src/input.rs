@@ -3,12 +3,13 @@
 use std::path::{Component, Path};
 
 use anyhow::{Context, anyhow, bail};
-use twinray::format::{self, Limits, PictureFile, SolutionFile};
+use twinray::format::{self, Limits, PictureFile, SceneSource};
 use twinray::scene::brdf::MIN_ALPHA;
 use twinray::scene::complete::complete;
 use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, Surface, builtin};
 
 use crate::args::{LoadArgs, ViewArgs};
+use crate::stored::{self, Stored};
 
 /// Patches where neither the user nor the scene says how many.
 const DEFAULT_PATCHES: usize = 100_000;
@@ -24,6 +25,17 @@ pub struct Loaded {
     pub cameras: Vec<Camera>,
     /// What was ignored or added, one line each.
     pub warnings: Vec<String>,
+    /// The solution file that stands for the scene, if it is one.
+    pub stored: Option<Stored>,
+    /// Where the scene is, as seen from the working folder, and how it was cut.
+    source: SceneSource,
+}
+
+impl Loaded {
+    /// Where the scene is, as seen from a folder, and how it was cut.
+    pub fn source_seen_from(&self, folder: &Path) -> SceneSource {
+        SceneSource { file: stored::seen_from(&self.source.file, folder), ..self.source.clone() }
+    }
 }
 
 /// Reads a scene from a file, or builds the built-in one; warnings go to the second part.
@@ -53,10 +65,14 @@ pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
     Ok((reading.scene, reading.warnings.iter().map(ToString::to_string).collect()))
 }
 
-/// Reads a solution file.
-pub fn read_solution(name: &str) -> anyhow::Result<SolutionFile> {
-    let bytes = std::fs::read(name).with_context(|| format!("{name}: cannot be read"))?;
-    format::read_solution(name, &bytes, &Limits::default()).map_err(|e| anyhow!("{e}"))
+/// Reads a scene, or that of a solution file.
+pub fn read_any(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
+    if !stored::is_solution(name) {
+        return read(name);
+    }
+    let file = Stored::open(name)?;
+    let scene = stored::scene_of(name, &file.read()?.provenance().source, None)?;
+    read(&scene)
 }
 
 /// Reads a picture.
@@ -67,20 +83,70 @@ pub fn read_picture(name: &str) -> anyhow::Result<PictureFile> {
 
 /// Loads a scene for solving, completed with a camera and light where it lacks them.
 pub fn load(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> {
-    let (mut scene, mut warnings) = read(&args.scene)?;
-    scale(&mut scene, args.unit.metres());
-    let wanted = view.map(|v| override_camera(&scene, v, args.unit.metres())).transpose()?.flatten();
+    if stored::is_solution(&args.scene) {
+        return load_stored(args, view);
+    }
+    if args.scene_file.is_some() {
+        bail!("--scene-file says where the scene of a .twin file is, and {} is none: leave it out", args.scene);
+    }
+    let source = SceneSource {
+        file: args.scene.clone(),
+        metres_per_unit: args.unit.unwrap_or_default().metres(),
+        patches: args.patches,
+        patch_size: args.patch_size,
+        two_sided: args.two_sided,
+    };
+    cut(source, view, true)
+}
+
+/// The scene of a solution file, cut as it was for it.
+fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> {
     let name = args.scene.as_str();
-    for addition in complete(&mut scene, wanted.as_ref(), args.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
+    let stored = Stored::open(name)?;
+    let (mut source, fingerprint, scene) = {
+        let file = stored.read()?;
+        let p = file.provenance();
+        (p.source.clone(), p.fingerprint, p.scene.clone())
+    };
+    let differs = [
+        ("--patches", args.patches.is_some_and(|n| Some(n) != source.patches)),
+        ("--patch-size", args.patch_size.is_some_and(|size| Some(size) != source.patch_size)),
+        ("--unit", args.unit.is_some_and(|unit| unit.metres() != source.metres_per_unit)),
+        ("--two-sided", args.two_sided && !source.two_sided),
+    ];
+    if let Some((option, _)) = differs.iter().find(|(_, differs)| *differs) {
+        bail!("{name}: was solved with another {option}: leave it out, or solve the scene anew");
+    }
+    source.file = stored::scene_of(name, &source, args.scene_file.as_deref())?;
+    let file = source.file.clone();
+    let loaded = cut(source, view, false)?;
+    let found = loaded.patches.fingerprint();
+    if found != fingerprint {
+        bail!(
+            "{name}: is the light of another scene: of \"{scene}\" with the fingerprint {fingerprint:016x}, and {file} has {found:016x}. It may have changed since; --scene-file FILE says where the right one is"
+        );
+    }
+    Ok(Loaded { stored: Some(stored), ..loaded })
+}
+
+/// Reads a scene, completes it and cuts it. A wanted camera may be lit by a lamp of its own, where there is no light, if it
+/// `decides`.
+fn cut(source: SceneSource, view: Option<&ViewArgs>, decides: bool) -> anyhow::Result<Loaded> {
+    let (mut scene, mut warnings) = read(&source.file)?;
+    scale(&mut scene, source.metres_per_unit);
+    let wanted = view.map(|v| override_camera(&scene, v, source.metres_per_unit)).transpose()?.flatten();
+    let name = source.file.as_str();
+    let lamp_at = wanted.as_ref().filter(|_| decides);
+    for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
         warnings.push(format!("{name}: {addition}"));
     }
     warnings.extend(sharp_lobes(&scene).map(|w| format!("{name}: {w}")));
-    let budget = match (args.patches, args.patch_size) {
+    let budget = match (source.patches, source.patch_size) {
         (Some(n), _) => PatchBudget::Count(n as usize),
         (None, Some(size)) => PatchBudget::Size(size),
         (None, None) => PatchBudget::Count(scene.suggested_patches.unwrap_or(DEFAULT_PATCHES)),
     };
-    let options = PatchOptions { budget, two_sided: args.two_sided };
+    let options = PatchOptions { budget, two_sided: source.two_sided };
     let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
     if patches.degenerate_triangles() > 0 {
         let count = patches.degenerate_triangles();
@@ -91,7 +157,7 @@ pub fn load(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> 
     if let Some(camera) = wanted {
         cameras.insert(0, camera);
     }
-    Ok(Loaded { name: scene.name, patches, cameras, warnings })
+    Ok(Loaded { name: scene.name, patches, cameras, warnings, stored: None, source })
 }
 
 /// Lengths of the file to metres.

@@ -1,23 +1,67 @@
-//! Ctrl-C: the first asks to stop at the end of the wave and keep the result, the second stops at once.
+//! Ctrl-C and SIGTERM: the first asks to stop at the end of the wave and keep the result, the second stops at once.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicI32, Ordering};
 
-static STOP: AtomicBool = AtomicBool::new(false);
+/// The signal that asked to stop; 0 for none.
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
-/// Installs the handler.
+const SAID: &str =
+    "\nstopping at the end of this wave or pass; what there is will be written (the same again stops at once)";
+
+/// Installs the handlers.
+#[cfg(unix)]
 pub fn install() {
-    // A second installation fails; there is none.
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    // A second installation would do no harm; there is none. Without signals there is nothing to listen to.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]) else { return };
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
+                // The last checkpoint is in its place.
+                crate::output::abandon();
+                std::process::exit(exit_code(signal).into());
+            }
+            eprintln!("{SAID}");
         }
-        eprintln!(
-            "\nstopping at the end of this wave or pass; what there is will be written (Ctrl-C again stops at once)"
-        );
     });
 }
 
-/// True once the user has asked to stop.
+/// Installs the handlers, where there are but flags.
+#[cfg(not(unix))]
+pub fn install() {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+    use std::time::Duration;
+
+    use signal_hook::consts::SIGINT;
+    let flag = Arc::new(AtomicBool::new(false));
+    if signal_hook::flag::register(SIGINT, Arc::clone(&flag)).is_err() {
+        return;
+    }
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(Duration::from_millis(50));
+            if flag.swap(false, Ordering::SeqCst) {
+                if SIGNAL.swap(SIGINT, Ordering::SeqCst) != 0 {
+                    crate::output::abandon();
+                    std::process::exit(exit_code(SIGINT).into());
+                }
+                eprintln!("{SAID}");
+            }
+        }
+    });
+}
+
+/// True once somebody has asked to stop.
 pub fn requested() -> bool {
-    STOP.load(Ordering::SeqCst)
+    SIGNAL.load(Ordering::SeqCst) != 0
+}
+
+/// The exit code of a program that was asked to stop: 128 and the signal's number, 130 for Ctrl-C and 143 for SIGTERM.
+pub fn code() -> u8 {
+    exit_code(SIGNAL.load(Ordering::SeqCst))
+}
+
+fn exit_code(signal: i32) -> u8 {
+    u8::try_from(128 + signal).unwrap_or(130)
 }

@@ -1,15 +1,27 @@
-//! Files are written beside their place and renamed: nobody ever meets half of one.
+//! Files are written beside their place and renamed: nobody ever meets half of one, whatever happens to the program.
+//!
+//! The file beside has a fixed name, so that a killed program leaves at most one, which the next run takes over; it is
+//! locked, so that two programs never write to one place.
 
-use std::io::Write;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use anyhow::{Context, bail};
+
+/// Files beside their places, to be removed by whoever ends the program at once.
+static BESIDE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// A place to write to, found writable before the long work starts.
 #[derive(Debug)]
 pub struct Output {
+    /// As the user named it.
+    name: String,
     path: PathBuf,
-    beside: tempfile::NamedTempFile,
+    beside: PathBuf,
+    /// Locked; `None` after a checkpoint, until the next.
+    file: Option<File>,
 }
 
 impl Output {
@@ -18,32 +30,91 @@ impl Output {
         if path.is_dir() {
             bail!("{}: is a folder; expected the name of a file to write", path.display());
         }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         if !folder.is_dir() {
             bail!("{}: there is no folder {}; expected one that exists", path.display(), folder.display());
         }
-        let beside = tempfile::Builder::new()
-            .prefix(".twinray-")
-            .tempfile_in(folder)
-            .with_context(|| format!("{}: cannot write into the folder {}", path.display(), folder.display()))?;
-        Ok(Self { path: path.to_owned(), beside })
+        let name = path.display().to_string();
+        // Through links, so that a link to a file stays one.
+        let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let last = path.file_name().context("expected the name of a file to write")?.to_string_lossy();
+        let beside = folder_of(&path).join(format!(".{last}.twinray"));
+        let file = open_beside(&name, &beside)?;
+        BESIDE.lock().unwrap_or_else(|e| e.into_inner()).push(beside.clone());
+        Ok(Self { name, path, beside, file: Some(file) })
     }
 
     /// Writes all of the file and puts it in its place.
     pub fn write(mut self, bytes: &[u8]) -> anyhow::Result<()> {
-        let path = self.path.display().to_string();
-        self.beside.write_all(bytes).with_context(|| format!("{path}: writing failed"))?;
-        self.beside.as_file().sync_all().with_context(|| format!("{path}: writing failed"))?;
-        // Temporary files are private; a result is as readable as the user's other files.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            let mode = std::fs::Permissions::from_mode(0o644);
-            self.beside.as_file().set_permissions(mode).with_context(|| format!("{path}: writing failed"))?;
+        self.put(|out| out.write_all(bytes))
+    }
+
+    /// Writes what there is so far and puts it in the file's place; more may follow.
+    pub fn put(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
+        let name = &self.name;
+        let mut file = match self.file.take() {
+            Some(file) => file,
+            None => open_beside(name, &self.beside)?,
+        };
+        let written = file.set_len(0).and_then(|()| write(&mut file)).and_then(|()| file.sync_all());
+        let written = written.and_then(|()| readable(&file));
+        if let Err(error) = written {
+            // Half a file helps nobody, and its room may be needed.
+            let _ = file.set_len(0);
+            self.file = Some(file);
+            return Err(error).context(format!("{name}: writing failed; what was there before is untouched"));
         }
-        self.beside.persist(&self.path).with_context(|| format!("{path}: cannot be replaced"))?;
+        std::fs::rename(&self.beside, &self.path).with_context(|| format!("{name}: cannot be replaced"))?;
+        // The new name itself must outlive a loss of power. Not every system lets a folder be opened for it.
+        if let Ok(folder) = File::open(folder_of(&self.path)) {
+            let _ = folder.sync_all();
+        }
         Ok(())
     }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        if self.file.is_some() {
+            let _ = std::fs::remove_file(&self.beside);
+        }
+        BESIDE.lock().unwrap_or_else(|e| e.into_inner()).retain(|path| *path != self.beside);
+    }
+}
+
+/// Removes what is written beside its place: for a program that ends at once.
+pub fn abandon() {
+    if let Ok(paths) = BESIDE.try_lock() {
+        paths.iter().for_each(|path| drop(std::fs::remove_file(path)));
+    }
+}
+
+fn open_beside(name: &str, beside: &Path) -> anyhow::Result<File> {
+    let folder = folder_of(Path::new(name));
+    let file = OpenOptions::new().write(true).create(true).truncate(false).open(beside);
+    let file = file.with_context(|| format!("{name}: cannot write into the folder {}", folder.display()))?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            bail!("{name}: another twinray is writing it; expected a name of its own for every run")
+        }
+        // Where nothing can be locked, nothing protects from a second program, and one alone needs nothing.
+        Err(TryLockError::Error(_)) | Ok(()) => Ok(file),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A result is as readable as the user's other files, whoever made the file that it replaces.
+fn readable(file: &File) -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    }
+    let _ = file;
+    Ok(())
 }
 
 /// The extension in lower case.

@@ -25,6 +25,8 @@ pub struct Progress {
     start: Instant,
     goal: Goal,
     unit: &'static str,
+    /// Rays that were there before the clock started.
+    before: u64,
     shown: Shown,
     last_line: f64,
 }
@@ -48,12 +50,17 @@ impl Progress {
         } else {
             Shown::Lines
         };
-        Self { start: Instant::now(), goal, unit: "rays", shown, last_line: 0.0 }
+        Self { start: Instant::now(), goal, unit: "rays", before: 0, shown, last_line: 0.0 }
     }
 
     /// Counts something else than rays.
     pub fn counting(self, unit: &'static str) -> Self {
         Self { unit, ..self }
+    }
+
+    /// Goes on from so many rays.
+    pub fn after(self, before: u64) -> Self {
+        Self { before, ..self }
     }
 
     /// Seconds since the start.
@@ -82,14 +89,14 @@ impl Progress {
     /// Tells how far the solve is.
     pub fn update(&mut self, rays: u64, relative_error: f64) {
         let seconds = self.seconds();
-        let rate = rays as f64 / seconds.max(1e-9);
+        let rate = rays.saturating_sub(self.before) as f64 / seconds.max(1e-9);
         let (share, left) = match self.goal {
-            Goal::Rays(n) => (rays as f64 / n as f64, n.saturating_sub(rays) as f64 / rate),
+            Goal::Rays(n) => (rays as f64 / n as f64, n.saturating_sub(rays) as f64 / rate.max(1e-9)),
             Goal::Seconds(s) => (seconds / s, (s - seconds).max(0.0)),
             // The error falls as the root of rays, or a little faster.
             Goal::Error(e) => {
                 let share = (e / relative_error.max(1e-12)).powi(2).min(1.0);
-                (share, seconds * (1.0 / share - 1.0))
+                (share, rays as f64 * (1.0 / share - 1.0) / rate.max(1e-9))
             }
         };
         let message = format!(

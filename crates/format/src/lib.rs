@@ -37,7 +37,5 @@ pub use crate::obj::{ObjFiles, write_obj};
 pub use crate::picture::{PictureFile, read_picture};
 pub use crate::png::write_png;
 pub use crate::read::{Reading, Resolver, read_scene};
-pub use crate::twin::{
-    Method, Provenance, SceneSource, SolutionFile, StoredSolution, read_solution, write_solution,
-};
+pub use crate::twin::{Method, Provenance, SceneSource, SolutionFile, StoredSolution, read_solution, write_solution};
 pub use crate::warning::Warning;

@@ -11,7 +11,7 @@ use crate::record::{RecordError, WavesRecord};
 use crate::source::PackedRepresentative;
 use crate::tally::Tally;
 
-const STREAM_MERGE: u64 = 6;
+const STREAM_MERGE: u64 = 8;
 
 /// Adds up solves of the default schedule by their seeds, which must differ; records that were added up before are
 /// welcome. The sums are taken in the order of seeds, so the order of `parts` changes no bit.
@@ -27,10 +27,9 @@ pub fn merge(parts: &[(u64, &WavesRecord)]) -> Result<WavesRecord<'static>, Reco
     let (_, first) = parts[0];
     for (_, part) in &parts {
         part.check()?;
-        for (array, found, expected) in [
-            ("deposits", part.deposits.len(), first.deposits.len()),
-            ("glossy", part.glossy.len(), first.glossy.len()),
-        ] {
+        for (array, found, expected) in
+            [("deposits", part.deposits.len(), first.deposits.len()), ("glossy", part.glossy.len(), first.glossy.len())]
+        {
             if found != expected {
                 return Err(RecordError::Length { array, found, expected });
             }

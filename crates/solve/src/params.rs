@@ -1,7 +1,11 @@
 //! Every knob of the solver, with its default and its place in the paper; the presets.
 
+use twinray_scene::sample::Stream;
+
 use crate::record::RecordError;
 use crate::strategies::Shares;
+
+const STREAM_PART: u64 = 7;
 
 /// How a ray's two transfers are estimated (paper §1 and §2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +76,11 @@ impl Params {
             shares: None,
             warm_start: 4.0,
         }
+    }
+
+    /// A seed for part `k` of `n` of a solve with this seed, so that all parts have random numbers of their own.
+    pub fn seed_of_part(seed: u64, k: u32, n: u32) -> u64 {
+        Stream::new(seed, STREAM_PART, u64::from(n) << 32 | u64::from(k)).bits()
     }
 
     /// The paper, corrected as `docs/paper.md` explains: one ray per iteration, chosen by power alone.

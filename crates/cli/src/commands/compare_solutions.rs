@@ -8,7 +8,7 @@ use twinray::render::compare::{self, LightDifference, PatchDifference};
 use crate::args::CompareArgs;
 use crate::commands::compare::verdict;
 use crate::failure::Ending;
-use crate::input;
+use crate::stored::Stored;
 
 /// Compares `args.test` with `args.reference`.
 pub fn run(args: &CompareArgs) -> anyhow::Result<Ending> {
@@ -18,7 +18,8 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Ending> {
     if args.diff.is_some() {
         bail!("--diff is for pictures; expected two PNG or EXR pictures, or no --diff");
     }
-    let (test, reference) = (input::read_solution(&args.test)?, input::read_solution(&args.reference)?);
+    let stored = [Stored::open(&args.test)?, Stored::open(&args.reference)?];
+    let (test, reference) = (stored[0].read_whole()?, stored[1].read_whole()?);
     if let Some(difference) = what_differs(&test, &reference) {
         bail!(
             "{} and {} are not of the same patches: {difference}. Solve both with the same scene, --patches (or --patch-size), --unit and --two-sided",
@@ -27,7 +28,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Ending> {
         );
     }
     let (a, b) = (&test.provenance, &reference.provenance);
-    if a.seed == b.seed && a.method == b.method && !args.quiet {
+    if a.seeds.iter().any(|seed| b.seeds.contains(seed)) && a.method == b.method && !args.quiet {
         eprintln!("warning: both have the seed {}: their errors are not independent, and z-scores say little", a.seed);
     }
     let difference = compare::solutions(&test.light, &reference.light);
@@ -42,7 +43,7 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Ending> {
 }
 
 /// Why the patches of two solutions are not the same ones; `None` if they are.
-fn what_differs(a: &SolutionFile, b: &SolutionFile) -> Option<String> {
+pub(super) fn what_differs(a: &SolutionFile, b: &SolutionFile) -> Option<String> {
     let (p, q) = (&a.provenance, &b.provenance);
     if p.fingerprint == q.fingerprint && a.light.len() == b.light.len() {
         return None;

@@ -7,15 +7,14 @@ use twinray::solve::{Params, Solver, state_bytes};
 use crate::args::InfoArgs;
 use crate::commands::{self, solution};
 use crate::failure::Ending;
-use crate::input;
-use crate::output::extension;
+use crate::{input, stored};
 
 /// Rays of the short solve behind the power balance, and of the test for closedness.
 const PROBE_RAYS: u64 = 200_000;
 
 /// Runs the command.
 pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
-    if extension(args.load.scene.as_ref()) == "twin" {
+    if stored::is_solution(&args.load.scene) {
         return solution::describe(&args.load.scene, args.load.json);
     }
     commands::set_threads(args.load.threads);

@@ -4,6 +4,7 @@ pub mod compare;
 mod compare_pictures;
 mod compare_solutions;
 pub mod info;
+pub mod merge;
 mod path;
 pub mod reference;
 pub mod render;

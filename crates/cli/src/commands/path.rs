@@ -24,7 +24,7 @@ const FIRST_SAMPLES: u32 = 16;
 pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
     let solver = [
         (args.solve.rays.is_some(), "--rays"),
-        (args.solve.preset == Preset::Paper, "--preset paper"),
+        (args.solve.preset == Some(Preset::Paper), "--preset paper"),
         (args.flat, "--flat"),
     ];
     match solver.iter().find(|(given, _)| *given) {
@@ -51,7 +51,7 @@ pub(super) fn run(
     let most = args.path.samples.unwrap_or(if until.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
     let goal = until.unwrap_or(Goal::Rays(u64::from(most) * pixels));
     let mut progress = Progress::new(goal, args.load.quiet).counting("paths");
-    let seed = args.solve.seed;
+    let seed = args.solve.seed.unwrap_or(1);
     let options = PathPictureOptions { width, height, samples: most, seed, technique: Technique::Both };
     let mut tracer = PixelTracer::new(&loaded.patches, camera, &options);
     loop {

@@ -30,7 +30,7 @@ pub fn run(args: &ReferenceArgs) -> anyhow::Result<Ending> {
     interrupt::install();
     let start = Instant::now();
     let loaded = input::load(&args.load, None)?;
-    let output = Output::open(&path)?;
+    let mut output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
         eprintln!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
@@ -39,8 +39,8 @@ pub fn run(args: &ReferenceArgs) -> anyhow::Result<Ending> {
 
     let mut tracer = PatchTracer::new(&loaded.patches, args.seed, Technique::Both);
     let (interrupted, tracing) = trace(args, &mut tracer, loaded.patches.len() as u64);
-    let solution = solution(args, &loaded, &tracer);
-    output.write(&format::write_solution(&solution))?;
+    let solution = solution(args, &loaded, &tracer, path.parent().unwrap_or(Path::new("")));
+    output.put(|out| format::write_solution(&solution, out))?;
     report(args, &loaded, &tracer, &path, &solution.provenance, [loading, tracing], interrupted);
     Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
 }
@@ -69,19 +69,23 @@ fn trace(args: &ReferenceArgs, tracer: &mut PatchTracer, patches: u64) -> (bool,
     (interrupt::requested(), progress.seconds())
 }
 
-fn solution(args: &ReferenceArgs, loaded: &Loaded, tracer: &PatchTracer) -> SolutionFile {
+fn solution(args: &ReferenceArgs, loaded: &Loaded, tracer: &PatchTracer, folder: &Path) -> SolutionFile<'static> {
     SolutionFile {
         provenance: Provenance {
             software: concat!("twinray ", env!("CARGO_PKG_VERSION")).to_owned(),
             method: Method::Reference,
             scene: loaded.name.clone(),
+            source: loaded.source_seen_from(folder),
             fingerprint: loaded.patches.fingerprint(),
             rays: loaded.patches.len() as u64 * u64::from(tracer.paths_per_patch()),
             seed: args.seed,
+            part: None,
+            seeds: vec![args.seed],
             settings: vec![("paths_per_patch".to_owned(), tracer.paths_per_patch().to_string())],
             relative_error: tracer.relative_error() as f32,
         },
         light: tracer.light(),
+        record: None,
     }
 }
 

@@ -3,18 +3,19 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use serde_json::json;
 use twinray::format;
 use twinray::render::{self, Exposure, Lobes, Picture, PictureOptions, ToneCurve};
 use twinray::scene::Camera;
-use twinray::solve::Observer;
+use twinray::solve::{Observer, Solution};
 
 use crate::args::{ExposureArg, LobesArg, MethodArg, RenderArgs, ToneArg};
 use crate::commands::{path, solving};
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
+use crate::settings::Settings;
 use crate::{commands, interrupt};
 
 /// Camera rays per pixel where the user does not say.
@@ -47,9 +48,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     if args.path.method == MethodArg::Path {
         return path::run(args, &loaded, camera, output, loading);
     }
-    let observer = Observer::new(&loaded.patches, camera);
-    let solved = solving::solve(&args.solve, &args.load.scene, &loaded, Some(observer), args.load.quiet)?;
-    let solution = &solved.solution;
+    let Light { solution, settings, seconds, rate, interrupted } = light(args, &loaded, camera)?;
 
     let start = Instant::now();
     let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
@@ -59,9 +58,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         LobesArg::Patches => Lobes::Patches,
     };
     let options = PictureOptions { width, height, samples, flat: args.flat, lobes };
-    let picture = render::render(&loaded.patches, solution, camera, &options);
+    let picture = render::render(&loaded.patches, &solution, camera, &options);
     let factor = exposure(args).factor(&picture);
-    let how = format!("{} rays, seed {}, preset {:?}", solution.rays(), args.solve.seed, args.solve.preset);
+    let how = format!("{} rays, seed {}, preset {:?}", solution.rays(), settings.seed, settings.preset);
     output.write(&encode(args, &loaded, &picture, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
@@ -70,17 +69,16 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
     commands::print_warnings(loss.as_slice(), args.load.quiet);
     warnings.extend(loss);
-    let rate = solved.rate();
     if !args.load.quiet {
         eprintln!("{}", commands::balance_line(&balance));
         eprintln!(
-            "{}: {} rays in {:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
+            "{}: {} rays {}in {seconds:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
             path.display(),
             solution.rays(),
-            solved.seconds,
+            if loaded.stored.is_some() { "loaded " } else { "" },
             rate * 1e-6,
             100.0 * solution.relative_error(),
-            args.solve.seed,
+            settings.seed,
             factor.log2(),
         );
     }
@@ -89,8 +87,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
             "output": path.display().to_string(), "method": "patches",
             "scene": loaded.name, "camera": camera.name,
             "triangles": loaded.patches.triangle_count(), "patches": loaded.patches.len(),
-            "rays": solution.rays(), "seed": args.solve.seed, "interrupted": solved.interrupted,
-            "seconds": { "load": loading, "solve": solved.seconds, "picture": drawing },
+            "rays": solution.rays(), "seed": settings.seed, "interrupted": interrupted,
+            "seconds": { "load": loading, "solve": seconds, "picture": drawing },
             "rays_per_second": rate,
             "relative_error": solution.relative_error(),
             "invalid_deposits": solution.invalid_deposits(),
@@ -100,7 +98,44 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         });
         println!("{report:#}");
     }
-    Ok(if solved.interrupted { Ending::Interrupted } else { Ending::Done })
+    Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+/// The light that the picture is taken of.
+struct Light {
+    solution: Solution,
+    settings: Settings,
+    /// Seconds that it took here, and rays per second.
+    seconds: f64,
+    rate: f64,
+    interrupted: bool,
+}
+
+/// Solves the scene, or takes the light of the solution file that stands for it.
+fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<Light> {
+    let name = &args.load.scene;
+    let Some(stored) = &loaded.stored else {
+        let settings = Settings::new(&args.solve, None);
+        let goal = solving::goal(&args.solve, loaded.patches.len(), None);
+        let observer = Observer::new(&loaded.patches, camera);
+        let solved = solving::solve((&settings, goal), name, loaded, Some(observer), args.load.quiet, |_| ())?;
+        let (seconds, rate, interrupted) = (solved.seconds, solved.rate(), solved.interrupted);
+        return Ok(Light { solution: solved.solver.solution(), settings, seconds, rate, interrupted });
+    };
+    if args.solve.rays.is_some() || args.solve.time.is_some() || args.solve.error.is_some() {
+        bail!(
+            "{name}: is solved already, so --rays, --time and --error are not for it: `twinray solve {name}` makes it better, and pictures then take what is there"
+        );
+    }
+    let start = Instant::now();
+    let file = stored.read()?;
+    let settings = Settings::stored(name, file.provenance(), &args.solve)?;
+    let record = file.record().map_err(|e| anyhow!("{e}"))?;
+    let record = record.ok_or_else(|| {
+        anyhow!("{name}: is a reference, which knows no reflections; expected a solve, as `twinray solve` writes it")
+    })?;
+    let solution = record.solution(&loaded.patches, &settings.params()).map_err(|e| anyhow!("{name}: {e}"))?;
+    Ok(Light { solution, settings, seconds: start.elapsed().as_secs_f64(), rate: 0.0, interrupted: false })
 }
 
 pub(super) fn default_output(scene: &str) -> PathBuf {

@@ -1,4 +1,4 @@
-//! `twinray solve`: solve a scene, keep the light of its patches.
+//! `twinray solve`: solve a scene, or go on with a solution file, and keep the light of its patches.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -6,12 +6,15 @@ use std::time::Instant;
 use anyhow::bail;
 use serde_json::json;
 use twinray::format::{self, Method, Provenance, SolutionFile};
+use twinray::solve::Solver;
 
 use crate::args::SolutionArgs;
 use crate::commands::{self, solving};
 use crate::failure::Ending;
+use crate::input::Loaded;
 use crate::output::{Output, extension};
-use crate::{input, interrupt};
+use crate::settings::Settings;
+use crate::{input, interrupt, stored};
 
 /// Runs the command.
 pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
@@ -23,6 +26,7 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     interrupt::install();
     let start = Instant::now();
     let loaded = input::load(&args.load, None)?;
+    let settings = settings(args, &loaded)?;
     let output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
@@ -30,38 +34,56 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     }
     let loading = start.elapsed().as_secs_f64();
 
-    let solved = solving::solve(&args.solve, &args.load.scene, &loaded, None, args.load.quiet)?;
-    let solution = &solved.solution;
-    // The same settings give the same bytes: no date, no path, no thread count.
-    let provenance = Provenance {
-        software: concat!("twinray ", env!("CARGO_PKG_VERSION")).to_owned(),
-        method: Method::Solve,
-        scene: loaded.name.clone(),
-        fingerprint: loaded.patches.fingerprint(),
-        rays: solution.rays(),
-        seed: args.solve.seed,
-        settings: solving::settings(&args.solve, &loaded),
-        relative_error: solution.relative_error() as f32,
-    };
-    let light = solution.patch_light(&loaded.patches);
-    let fingerprint = format!("{:016x}", provenance.fingerprint);
-    output.write(&format::write_solution(&SolutionFile { provenance, light }))?;
-
-    let balance = solution.balance();
+    let mut keeper = Keeper::new(&loaded, settings, &path, output);
+    let goal = solving::goal(&args.solve, loaded.patches.len(), settings.part);
+    let mut last = Instant::now();
     let mut warnings = loaded.warnings.clone();
+    let (mut checkpoints, mut failed) = (0, 0);
+    let solved = solving::solve((&settings, goal), &args.load.scene, &loaded, None, args.load.quiet, |solver| {
+        if args.checkpoint.0.is_none_or(|interval| last.elapsed().as_secs_f64() < interval) {
+            return;
+        }
+        match keeper.keep(solver) {
+            Ok(_) => checkpoints += 1,
+            // A full disk may have room again by the end, and what is known is in memory.
+            Err(error) => {
+                if failed == 0 {
+                    warnings.push(format!("no checkpoint: {error:#}"));
+                    commands::print_warnings(&warnings[warnings.len() - 1..], args.load.quiet);
+                }
+                failed += 1;
+            }
+        }
+        last = Instant::now();
+    })?;
+    let solver = &solved.solver;
+    let idle = solved.before > 0 && solver.rays() == solved.before;
+    let error = keeper.keep(solver)?;
+
+    let solution = solver.solution();
+    let balance = solution.balance();
     let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
     commands::print_warnings(loss.as_slice(), args.load.quiet);
     warnings.extend(loss);
+    let fingerprint = format!("{:016x}", keeper.provenance.fingerprint);
     if !args.load.quiet {
         eprintln!("{}", commands::balance_line(&balance));
+        if idle && !solved.interrupted {
+            eprintln!(
+                "{}: had {} rays already and is as good as asked for; --rays, --time or --error says how far to go on",
+                args.load.scene, solved.before
+            );
+        }
+        let resumed = if solved.before > 0 { format!(", {} before", solved.before) } else { String::new() };
         eprintln!(
-            "{}: {} rays in {:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}, fingerprint {fingerprint}",
+            "{}: {} rays{resumed} in {:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}{}, fingerprint {fingerprint}",
             path.display(),
-            solution.rays(),
+            solver.rays(),
             solved.seconds,
             solved.rate() * 1e-6,
-            100.0 * solution.relative_error(),
-            args.solve.seed,
+            100.0 * error,
+            settings.seed,
+            settings.part.map_or(String::new(), |[k, n]| format!(" part {k}/{n}")),
         );
     }
     if args.load.json {
@@ -69,10 +91,12 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
             "output": path.display().to_string(),
             "scene": loaded.name, "fingerprint": fingerprint,
             "triangles": loaded.patches.triangle_count(), "patches": loaded.patches.len(),
-            "rays": solution.rays(), "seed": args.solve.seed, "interrupted": solved.interrupted,
+            "rays": solver.rays(), "rays_before": solved.before, "seed": settings.seed, "part": settings.part,
+            "interrupted": solved.interrupted,
+            "checkpoints": checkpoints, "failed_checkpoints": failed,
             "seconds": { "load": loading, "solve": solved.seconds },
             "rays_per_second": solved.rate(),
-            "relative_error": solution.relative_error(),
+            "relative_error": error,
             "invalid_deposits": solution.invalid_deposits(),
             "power": commands::balance_json(&balance),
             "warnings": warnings,
@@ -82,7 +106,70 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     Ok(if solved.interrupted { Ending::Interrupted } else { Ending::Done })
 }
 
+/// The settings of the command line, or of the file that is gone on with.
+fn settings(args: &SolutionArgs, loaded: &Loaded) -> anyhow::Result<Settings> {
+    let Some(stored) = &loaded.stored else { return Ok(Settings::new(&args.solve, args.part)) };
+    let name = &args.load.scene;
+    let file = stored.read()?;
+    if file.provenance().method == Method::Reference {
+        bail!("{name}: is a reference, traced by paths; expected a solve to go on with, as `twinray solve` writes it");
+    }
+    if !file.can_go_on() {
+        bail!(
+            "{name}: is several solves added up and has no state to go on from: go on with one of them, or solve the scene with another --seed, and merge again"
+        );
+    }
+    if args.part.is_some_and(|part| Some(part) != file.provenance().part) {
+        bail!("{name}: was solved with another --part: leave it out to go on");
+    }
+    Settings::stored(name, file.provenance(), &args.solve)
+}
+
+/// Keeps what a solver has in a file.
+struct Keeper<'a> {
+    output: Output,
+    loaded: &'a Loaded,
+    provenance: Provenance,
+}
+
+impl<'a> Keeper<'a> {
+    fn new(loaded: &'a Loaded, settings: Settings, path: &Path, output: Output) -> Self {
+        // The same settings give the same bytes: no date, no thread count, no goal.
+        let provenance = Provenance {
+            software: concat!("twinray ", env!("CARGO_PKG_VERSION")).to_owned(),
+            method: Method::Solve,
+            scene: loaded.name.clone(),
+            source: loaded.source_seen_from(path.parent().unwrap_or(Path::new(""))),
+            fingerprint: loaded.patches.fingerprint(),
+            rays: 0,
+            seed: settings.seed,
+            part: settings.part,
+            seeds: vec![settings.effective_seed()],
+            settings: settings.words(),
+            relative_error: f32::INFINITY,
+        };
+        Self { output, loaded, provenance }
+    }
+
+    /// Writes it, and says how large the error is.
+    fn keep(&mut self, solver: &Solver) -> anyhow::Result<f64> {
+        let patches = &self.loaded.patches;
+        let record = solver.record();
+        let area = patches.patches().map(|p| patches.area(p)).collect();
+        let emits = patches.patches().map(|p| !patches.emission(p).is_black()).collect();
+        let (light, error) = record.light(area, emits);
+        let relative_error = error as f32;
+        let provenance = Provenance { rays: record.rays(), relative_error, ..self.provenance.clone() };
+        let file = SolutionFile { provenance, light, record: Some(record) };
+        self.output.put(|out| format::write_solution(&file, out))?;
+        Ok(error)
+    }
+}
+
 fn default_output(scene: &str) -> PathBuf {
+    if stored::is_solution(scene) {
+        return PathBuf::from(scene);
+    }
     let stem = Path::new(scene).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     PathBuf::from(format!("{stem}.twin"))
 }

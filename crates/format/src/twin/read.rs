@@ -89,7 +89,8 @@ impl<'a> StoredSolution<'a> {
     /// `Invalid` if a value makes no sense (an area that is negative or not finite, an irradiance that is not finite, a standard
     /// error that is negative or not a number).
     pub fn light(&self) -> Result<PatchLight, FormatError> {
-        let area = self.checked(AREA, Kind::F64, |a: &f64| a.is_finite() && *a >= 0.0, "a finite area of at least 0")?;
+        let area =
+            self.checked(AREA, Kind::F64, |a: &f64| a.is_finite() && *a >= 0.0, "a finite area of at least 0")?;
         let emits = self.checked(EMITS, Kind::Bytes, |e: &u8| *e <= 1, "0 or 1")?;
         let (area, emits) = (area.into_owned(), emits.iter().map(|&e| e == 1).collect());
         let bar = |s: &f32| *s >= 0.0;
@@ -141,7 +142,9 @@ impl<'a> StoredSolution<'a> {
         let (patches, glossy) = (self.patches, self.glossy);
         let totals = self.sections.rows::<u64>("totals", Kind::U64, 1 + TALLY_WORDS)?;
         let runs = match self.can_go_on {
-            true => Some([self.run(["run-0", "radiance-0"], None)?, self.run(["run-1", "radiance-1"], Some("sample-1"))?]),
+            true => {
+                Some([self.run(["run-0", "radiance-0"], None)?, self.run(["run-1", "radiance-1"], Some("sample-1"))?])
+            }
             false => None,
         };
         Ok(WavesRecord {

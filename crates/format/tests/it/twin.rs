@@ -256,7 +256,9 @@ fn values_that_make_no_sense_are_named() {
     refused(&one_patch(&header(), ("error", &(-1f32).to_le_bytes())), &["section \"error\", patch 0", "infinity"]);
     refused(&one_patch(&header(), ("error", &f32::NAN.to_le_bytes())), &["section \"error\", patch 0", "NaN"]);
     refused(&one_patch(&header(), ("emits", &[2])), &["section \"emits\", patch 0", "found 2", "0 or 1"]);
-    let shape = |name, kind, columns| container(2, &[("header", "|u1", 1, header().to_string().as_bytes()), (name, kind, columns, &[0; 8])]);
+    let shape = |name, kind, columns| {
+        container(2, &[("header", "|u1", 1, header().to_string().as_bytes()), (name, kind, columns, &[0; 8])])
+    };
     refused(&shape("area", "<f4", 2), &["section \"area\" has 2 of <f4", "1 columns of <f8"]);
     refused(&one_patch(&header(), ("hits", &[0; 8])), &["section \"hits\" has 8 bytes", "1 rows of 4 bytes"]);
 }

@@ -116,11 +116,11 @@ fn what_does_not_fit_is_refused() {
     let mut solver = Solver::new(&small, params.clone(), None).unwrap();
     solver.run(50_000);
     let record = copied(&solver.record());
-    let refused = |scene: &PatchScene, params: Params, record: &Record| {
-        match Solver::resume(scene, params, record).unwrap_err() {
-            SolveError::Record(error) => error,
-            other => panic!("{other}"),
-        }
+    let refused = |scene: &PatchScene, params: Params, record: &Record| match Solver::resume(scene, params, record)
+        .unwrap_err()
+    {
+        SolveError::Record(error) => error,
+        other => panic!("{other}"),
     };
     assert!(matches!(refused(&large, params.clone(), &record), RecordError::Length { array: "deposits", .. }));
     assert!(matches!(refused(&small, Params::paper_preset(1), &record), RecordError::Schedule { .. }));
