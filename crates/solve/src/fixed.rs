@@ -70,6 +70,11 @@ impl FixedRgb {
         }
     }
 
+    /// The sum in units, to be added to others.
+    pub fn units_mut(&mut self) -> &mut [i64; 3] {
+        &mut self.0
+    }
+
     /// The sum.
     #[inline]
     pub fn value(&self, unit: Unit) -> Rgb {

@@ -9,6 +9,7 @@ use crate::frozen;
 use crate::glossy::GlossyPatches;
 use crate::observer::Observer;
 use crate::params::{Params, Schedule, SolveError};
+use crate::peers::{Among, Peers, digest};
 use crate::record::{Record, RecordError};
 use crate::replicas::Replicas;
 use crate::sequential::Sequential;
@@ -27,6 +28,7 @@ pub struct Solver<'a> {
     scene: &'a PatchScene,
     params: Params,
     glossy: GlossyPatches,
+    among: Among<'a>,
     state: State,
 }
 
@@ -43,16 +45,31 @@ impl<'a> Solver<'a> {
     /// # Errors
     /// If nothing emits, or a setting is out of range.
     pub fn new(scene: &'a PatchScene, params: Params, observer: Option<Observer>) -> Result<Self, SolveError> {
+        Self::among(scene, params, observer, None)
+    }
+
+    /// Starts a solve that is shared with other processes. Each of them does this with the same scene, settings and observer,
+    /// and from then on calls the same methods with the same arguments. All get the bits that one process alone would get.
+    ///
+    /// # Errors
+    /// As [`Solver::new`]; and if the peers were given other work, or the schedule is the paper's, which goes ray by ray.
+    pub fn among(
+        scene: &'a PatchScene,
+        params: Params,
+        observer: Option<Observer>,
+        peers: Option<&'a dyn Peers>,
+    ) -> Result<Self, SolveError> {
+        let among = meet(scene, &params, &format!("{observer:?}"), peers)?;
         check(scene, &params)?;
         let glossy = GlossyPatches::new(scene, observer.as_ref());
         let state = match params.schedule {
             Schedule::Paper { batch } => State::Sequential(Box::new(Sequential::new(scene, &glossy)), batch.max(1)),
             Schedule::Waves => {
-                let around = Surroundings { scene, glossy: &glossy, params: &params, lap: &|_| () };
+                let around = Surroundings { scene, glossy: &glossy, params: &params, among, lap: &|_| () };
                 State::Waves(Box::new(Replicas::new(around)))
             }
         };
-        Ok(Self { scene, params, glossy, state })
+        Ok(Self { scene, params, glossy, among, state })
     }
 
     /// Goes on from what [`Solver::record`] gave: the same scene and settings then give the same bits as if nothing had come
@@ -62,13 +79,28 @@ impl<'a> Solver<'a> {
     /// As [`Solver::new`]; and if the record is of another scene or schedule, has no state to go on from, or holds what no
     /// solve gives.
     pub fn resume(scene: &'a PatchScene, params: Params, record: &Record) -> Result<Self, SolveError> {
+        Self::resume_among(scene, params, record, None)
+    }
+
+    /// [`Solver::resume`] among other processes, all of which go on from the same record. Neither their number nor that of
+    /// those who made the record matters.
+    ///
+    /// # Errors
+    /// As [`Solver::resume`] and [`Solver::among`].
+    pub fn resume_among(
+        scene: &'a PatchScene,
+        params: Params,
+        record: &Record,
+        peers: Option<&'a dyn Peers>,
+    ) -> Result<Self, SolveError> {
+        let among = meet(scene, &params, &format!("{:016x}", record.digest()), peers)?;
         check(scene, &params)?;
         record.check()?;
         let glossy = GlossyPatches::new(scene, None);
         record.check_belongs(scene, &glossy)?;
         let state = match (params.schedule, record) {
             (Schedule::Waves, Record::Waves(waves)) => {
-                let around = Surroundings { scene, glossy: &glossy, params: &params, lap: &|_| () };
+                let around = Surroundings { scene, glossy: &glossy, params: &params, among, lap: &|_| () };
                 State::Waves(Box::new(Replicas::resume(around, waves)?))
             }
             (Schedule::Paper { batch }, Record::Sequential(sequential)) => {
@@ -77,7 +109,7 @@ impl<'a> Solver<'a> {
             (Schedule::Waves, _) => return Err(RecordError::Schedule { expected: "waves" }.into()),
             (Schedule::Paper { .. }, _) => return Err(RecordError::Schedule { expected: "the paper's" }.into()),
         };
-        Ok(Self { scene, params, glossy, state })
+        Ok(Self { scene, params, glossy, among, state })
     }
 
     /// Everything that decides how the solve goes on, but for what an observer was sent. O(K).
@@ -117,7 +149,8 @@ impl<'a> Solver<'a> {
                 s.advance(self.scene, &self.glossy, &self.params, rays, *batch);
             }
             State::Waves(w) => {
-                w.advance(Surroundings { scene: self.scene, glossy: &self.glossy, params: &self.params, lap });
+                let (scene, glossy, params) = (self.scene, &self.glossy, &self.params);
+                w.advance(Surroundings { scene, glossy, params, among: self.among, lap });
             }
         }
     }
@@ -159,9 +192,31 @@ impl<'a> Solver<'a> {
         match &self.state {
             State::Sequential(s, _) => s.solution(self.scene, &self.glossy, &self.params),
             State::Waves(w) => {
-                w.solution(Surroundings { scene: self.scene, glossy: &self.glossy, params: &self.params, lap: &|_| () })
+                let (scene, glossy, params) = (self.scene, &self.glossy, &self.params);
+                w.solution(Surroundings { scene, glossy, params, among: self.among, lap: &|_| () })
             }
         }
+    }
+}
+
+/// Makes sure that all peers do the same, and something that can be shared. Done first: whoever failed alone would leave
+/// the others waiting.
+fn meet<'a>(
+    scene: &PatchScene,
+    params: &Params,
+    start: &str,
+    peers: Option<&'a dyn Peers>,
+) -> Result<Among<'a>, SolveError> {
+    let among = Among::new(peers);
+    if among.is_alone() {
+        return Ok(among);
+    }
+    if !among.agree(digest(scene.fingerprint(), &format!("{params:?} {start}"))) {
+        return Err(SolveError::PeersDiffer);
+    }
+    match params.schedule {
+        Schedule::Paper { .. } => Err(SolveError::PaperPeers),
+        Schedule::Waves => Ok(among),
     }
 }
 
@@ -192,7 +247,7 @@ fn check(scene: &PatchScene, params: &Params) -> Result<(), SolveError> {
 }
 
 /// Bytes that a solve of a scene of so many patches, of which some are glossy, keeps for each (default schedule), error
-/// bars and table of the choice included; beside them are the lists of the rays in flight, 37 bytes a ray of a wave.
+/// bars and table of the choice included; beside them are the lists of the rays in flight, 33 bytes a ray of a wave.
 pub fn state_bytes(patches: usize, glossy: usize, observed: bool) -> usize {
     let lobe = close::BYTES_PER_GLOSSY_PATCH
         + frozen::BYTES_PER_GLOSSY_PATCH

@@ -118,4 +118,14 @@ pub enum SolveError {
         "the paper preset selects patches only and cannot shoot from an environment: use the default preset, or light the scene with emitting surfaces"
     )]
     PaperEnvironment,
+    /// The paper's schedule goes ray by ray: there is nothing to share out.
+    #[error(
+        "the paper preset shoots one ray after the other and cannot be shared by processes: use the default preset, or one process"
+    )]
+    PaperPeers,
+    /// Ranks were given different work, and would wait for each other or mix up their light.
+    #[error(
+        "the processes of this solve differ in their scenes or settings: give all of them the same files and options"
+    )]
+    PeersDiffer,
 }

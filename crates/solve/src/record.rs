@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 
+use twinray_scene::sample::stream::mix;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 use crate::glossy::GlossyPatches;
@@ -203,6 +204,23 @@ impl Record<'_> {
         match self {
             Record::Waves(waves) => waves.light(area, emits),
             Record::Sequential(sequential) => sequential.light(area, emits),
+        }
+    }
+
+    /// One number for what decides how the solve goes on: equal records have equal ones.
+    pub(crate) fn digest(&self) -> u64 {
+        let eat = |hash: u64, word: u64| mix(hash ^ word);
+        match self {
+            Record::Waves(waves) => {
+                let runs = || waves.runs.iter().flatten();
+                let words = runs().flat_map(|run| run.words);
+                let sums = waves.deposits.as_flattened().iter().map(|x| x.to_bits());
+                let light = runs().flat_map(|run| run.radiance.as_flattened()).map(|x| u64::from(x.to_bits()));
+                words.chain(sums).chain(light).fold(waves.rays, eat)
+            }
+            Record::Sequential(sequential) => {
+                sequential.irradiance.as_flattened().iter().map(|x| x.to_bits()).fold(sequential.rays, eat)
+            }
         }
     }
 

@@ -161,6 +161,25 @@ impl Fit {
         self.witnesses += other.witnesses;
     }
 
+    /// Numbers in it.
+    pub(crate) const WORDS: usize = 2 * STRATEGIES + 1;
+
+    /// All of it, bit by bit.
+    pub(crate) fn to_words(self) -> [u64; Self::WORDS] {
+        let mut words = [0; Self::WORDS];
+        let sums = self.sums.as_flattened().iter().chain([&self.witnesses]);
+        words.iter_mut().zip(sums).for_each(|(word, sum)| *word = sum.to_bits());
+        words
+    }
+
+    /// The inverse of [`Fit::to_words`].
+    pub(crate) fn from_words(words: [u64; Self::WORDS]) -> Self {
+        let mut fit = Self::default();
+        let sums = fit.sums.as_flattened_mut().iter_mut().chain([&mut fit.witnesses]);
+        sums.zip(words).for_each(|(sum, word)| *sum = f64::from_bits(word));
+        fit
+    }
+
     /// The shares after a step; the old ones until there are enough witnesses.
     pub(crate) fn step(&self, old: Shares) -> Shares {
         let totals = self.sums.map(|sums| sums.iter().sum::<f64>());
@@ -211,6 +230,15 @@ mod tests {
         // 20 000 witnesses tell the ratio to about 1 %.
         assert!((shares.power - 0.8).abs() < 0.01, "{shares:?}");
         assert_eq!(shares.environment, 0.0);
+    }
+
+    #[test]
+    fn words_hold_all_of_it() {
+        let mut fit = Fit::default();
+        assert_eq!(fit.to_words(), [0; Fit::WORDS], "nothing must be all zeros");
+        fit.observe([1.0, 3.0], 0.7, [0.1, 0.2, 0.3, 0.4, 0.5], [0.5, 0.6, 0.7, 0.8, 0.9]);
+        let copy = Fit::from_words(fit.to_words());
+        assert_eq!((copy.sums, copy.witnesses), (fit.sums, fit.witnesses));
     }
 
     #[test]

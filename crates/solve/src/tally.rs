@@ -58,3 +58,18 @@ impl Tally {
         self.sky += other.sky * weight;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_hold_all_of_it() {
+        let color = |x: f64| Rgb::new(x, -x, 0.1 / x);
+        let [arrived, absorbed, escaped] = [1.0, 2.0, 3.0].map(color);
+        let tally =
+            Tally { rays: u64::MAX - 3, arrived, absorbed, escaped, lost: color(4.0), sky: color(5.0), invalid: 9 };
+        assert_eq!(Tally::from_words(tally.to_words()), tally);
+        assert_eq!(Tally::default().to_words(), [0; TALLY_WORDS], "nothing must be all zeros");
+    }
+}

@@ -21,6 +21,7 @@ use crate::fixed::Units;
 use crate::frozen::{Frozen, FrozenTables, Start};
 use crate::glossy::GlossyPatches;
 use crate::params::{Estimator, Params};
+use crate::peers::Among;
 use crate::solution::PowerBalance;
 use crate::source::{PackedRepresentative, Source};
 use crate::stage::{Lap, Stage};
@@ -55,6 +56,7 @@ pub(crate) struct Surroundings<'a> {
     pub scene: &'a PatchScene,
     pub glossy: &'a GlossyPatches,
     pub params: &'a Params,
+    pub among: Among<'a>,
     pub lap: Lap<'a>,
 }
 
@@ -241,6 +243,7 @@ impl Waves {
             estimator: around.params.estimator,
             representation: around.params.representation,
             seed,
+            among: around.among,
             lap: around.lap,
         }
     }

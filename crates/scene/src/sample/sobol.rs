@@ -79,6 +79,17 @@ impl SobolBlock<'_> {
         owen_scramble(low, self.scrambles[0])
     }
 
+    /// The inverse, as far as `count` digits go: the number below 2^`count` whose point has them, as points `low` have that
+    /// agree with it modulo 2^`count`, and no others.
+    pub fn with_first_digits(&self, digits: u32, count: u32) -> u32 {
+        // Digit by digit: a bit of the number decides its own digit and later ones alone.
+        (0..count).fold(0, |low, k| {
+            let is = self.first_digits(low) >> (31 - k) & 1;
+            let wanted = digits >> (count - 1 - k) & 1;
+            low | (is ^ wanted) << k
+        })
+    }
+
     /// Point `low` of the block: 53 bits in dimension 0, 32 in the others.
     #[inline]
     pub fn point(&self, low: u32) -> [f64; DIMENSIONS] {
@@ -179,6 +190,20 @@ mod tests {
                 let first = sobol.block(index).first_digits(index as u32);
                 assert_eq!(f64::from(first >> 20), (sobol.point(index)[0] * 4096.0).floor());
                 assert!(!std::mem::replace(&mut seen[(first >> 20) as usize], true));
+            }
+        }
+    }
+
+    /// What ranks rely on to put only their own rays in order.
+    #[test]
+    fn first_digits_tell_the_points_that_have_them() {
+        let sobol = Sobol::new(6);
+        for block in [sobol.block(0), sobol.block(7 << 32)] {
+            for count in [0, 1, 5, 9] {
+                for low in (0..3000).map(|k: u32| k.wrapping_mul(0x9E37_79B9)) {
+                    let digits = (u64::from(block.first_digits(low)) >> (32 - count)) as u32;
+                    assert_eq!(block.with_first_digits(digits, count), low & ((1 << count) - 1), "{count} digits");
+                }
             }
         }
     }

@@ -1,22 +1,23 @@
 //! The end of a wave: deposits are added to their patches, and what rays start from moves on.
 //!
-//! Bucket by bucket: each is summed by one thread in 64-bit fixed point (no order of tasks, threads or machines changes
-//! a bit), then entered with the wave's weights into the output, which remembers everything, and into the source,
-//! which forgets. Sums of a wave live only here, so that a patch has no memory for them.
+//! Bucket by bucket: each is summed by one thread (`bucket`), then entered with the wave's weights into the output, which
+//! remembers everything, and into the source, which forgets. Sums of a wave live only here, so that a patch has no
+//! memory for them. Where ranks share the wave, buckets are summed and entered in groups, and between the two the sums of
+//! all ranks are added up (`exchange`).
 
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
 use twinray_scene::brdf::Brdf;
 use twinray_scene::sample::Stream;
-use twinray_scene::sample::stream::{mix, to_unit};
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
-use super::deposits::{Buckets, Deposit};
-use super::{Task, Wave, WaveContext};
-use crate::direction;
+use super::bucket::{BucketSums, GlossySums, PatchSums};
+use super::deposits::Buckets;
+use super::exchange;
+use super::{Wave, WaveContext};
 use crate::error_bars::PatchEvidence;
-use crate::fixed::{FixedRgb, Units};
+use crate::fixed::Units;
 use crate::glossy::GlossyPatches;
 use crate::params::Representation;
 use crate::source::{PackedRepresentative, Source};
@@ -114,14 +115,30 @@ impl Wave {
         unshot: &mut [Source],
         output: &mut OutputState,
     ) -> Closed {
-        let parts = parts(context, state, unshot, output);
-        let closed: Vec<Closed> = parts
-            .into_par_iter()
-            .map_init(Sums::default, |sums, mut part| {
-                sums.add(context, closing, &self.tasks, &part);
-                part.enter(context, closing, sums)
-            })
-            .collect();
+        let mut parts = parts(context, state, unshot, output);
+        let mut closed: Vec<Closed> = Vec::new();
+        match context.among.sharing(closing.rays, context.scene.len()) {
+            None => parts
+                .into_par_iter()
+                .map_init(BucketSums::default, |sums, mut part| {
+                    sums.fill(context, closing, &self.tasks, &part);
+                    part.enter(context, closing, sums)
+                })
+                .collect_into_vec(&mut closed),
+            Some(peers) => {
+                for group in parts.chunks_mut(EXCHANGED_BUCKETS) {
+                    let fill = |part: &Part| {
+                        let mut sums = BucketSums::default();
+                        sums.fill(context, closing, &self.tasks, part);
+                        sums
+                    };
+                    let mut sums: Vec<BucketSums> = group.par_iter().map(fill).collect();
+                    exchange::add_up(peers, context.glossy.is_observed(), &mut sums);
+                    let enter = |(part, sums): (&mut Part, &BucketSums)| part.enter(context, closing, sums);
+                    closed.par_extend(group.par_iter_mut().zip(&sums).map(enter));
+                }
+            }
+        }
         let mut total = Closed::default();
         for c in closed {
             total.arrived += c.arrived;
@@ -131,11 +148,15 @@ impl Wave {
     }
 }
 
+/// Buckets whose sums ranks add up at a time: few enough for their memory not to matter beside the state's, enough for all
+/// threads and for long messages.
+const EXCHANGED_BUCKETS: usize = 64;
+
 /// A bucket's own slices of the state.
-struct Part<'a> {
-    bucket: usize,
-    first: usize,
-    first_glossy: usize,
+pub(super) struct Part<'a> {
+    pub(super) bucket: usize,
+    pub(super) first: usize,
+    pub(super) first_glossy: usize,
     sources: &'a mut [Source],
     unshot: &'a mut [Source],
     deposits: &'a mut [[f64; 3]],
@@ -143,6 +164,13 @@ struct Part<'a> {
     representatives: &'a mut [PackedRepresentative],
     reflected: &'a mut [[f32; 3]],
     observed: &'a mut [[[f32; 3]; 2]],
+}
+
+impl Part<'_> {
+    /// Patches of the bucket, and how many of them are glossy.
+    pub(super) fn sizes(&self) -> [usize; 2] {
+        [self.sources.len(), self.representatives.len()]
+    }
 }
 
 fn parts<'a>(
@@ -187,114 +215,9 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     rest.split_off_mut(..count.min(rest.len())).unwrap_or_default()
 }
 
-/// A bucket's sums of one wave.
-#[derive(Debug, Default)]
-struct Sums {
-    patches: Vec<PatchSums>,
-    glossy: Vec<GlossySums>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct PatchSums {
-    deposits: FixedRgb,
-    squares: i64,
-    hits: u32,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct GlossySums {
-    reflected: FixedRgb,
-    observed: [FixedRgb; 2],
-    importance: i64,
-    best: Option<Candidate>,
-}
-
-/// A candidate for a glossy patch's representative.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    /// Exponential variate over importance: the smallest of a wave is drawn in proportion to importance.
-    key: f64,
-    power: Rgb,
-    from: u32,
-}
-
-impl Sums {
-    /// Sums all that the tasks left in a bucket.
-    fn add(&mut self, context: &WaveContext, closing: &Closing, tasks: &[Task], part: &Part) {
-        self.patches.clear();
-        self.patches.resize(part.sources.len(), PatchSums::default());
-        self.glossy.clear();
-        self.glossy.resize(part.representatives.len(), GlossySums::default());
-        let units = closing.units;
-        for task in tasks {
-            let (deposits, from) = task.deposits.bucket(part.bucket);
-            for (k, deposit) in deposits.iter().enumerate() {
-                if deposit.is_nothing() {
-                    continue;
-                }
-                if !deposit.is_direct_part() {
-                    let sums = &mut self.patches[deposit.patch().index() - part.first];
-                    let power = deposit.power();
-                    sums.deposits.add(power, units.deposit);
-                    // Squares span twice the orders of magnitude that deposits do, so they are rounded at random.
-                    let [a, b] = deposit.bits();
-                    let square = power.luminance() * power.luminance();
-                    sums.squares += units.square.quantize_dithered(square, to_unit(mix(a ^ b.rotate_left(32))));
-                    sums.hits += 1;
-                }
-                if let Some(number) = context.glossy.number_of(deposit.patch()) {
-                    let lobe = &mut self.glossy[number - part.first_glossy];
-                    lobe.add(context, closing, deposit, from[k], number);
-                }
-            }
-        }
-    }
-}
-
-impl GlossySums {
-    fn add(&mut self, context: &WaveContext, closing: &Closing, deposit: &Deposit, from: u32, number: usize) {
-        let (patch, power) = (deposit.patch(), deposit.power());
-        let (n, wi) = (context.scene.normal(patch), direction::unpack(from));
-        let brdf = context.scene.brdf(patch);
-        let unit = closing.units.deposit;
-        if context.representation != Representation::Main
-            && let Some(eye) = context.glossy.to_eye(number)
-        {
-            let lobe = power * brdf.lobe_eval(n, wi, eye);
-            if deposit.is_direct_part() {
-                self.observed[0].add(lobe, unit);
-                self.observed[1].add(-lobe, unit);
-            } else {
-                self.observed[1].add(lobe, unit);
-            }
-        }
-        if deposit.is_direct_part() {
-            return;
-        }
-        let cosine = n.dot(wi).max(0.0);
-        let albedo = brdf.albedo(cosine);
-        self.reflected.add(power * albedo, unit);
-        let importance = match context.representation {
-            Representation::Main => return,
-            Representation::Sample => (power * albedo).luminance(),
-            _ => (power * brdf.lobe_albedo(cosine)).luminance(),
-        };
-        if importance > 0.0 && cosine > 0.0 {
-            self.importance += unit.quantize(importance);
-            // A number from the deposit's own bits: the same whoever shot it, in whatever order.
-            let [a, b] = deposit.bits();
-            let uniform = to_unit(mix(mix(closing.seed ^ a) ^ mix(b ^ u64::from(from) << 32)));
-            let key = -libm::log(1.0 - uniform) / importance;
-            if self.best.is_none_or(|best| key < best.key) {
-                self.best = Some(Candidate { key, power, from });
-            }
-        }
-    }
-}
-
 impl Part<'_> {
     /// Enters the sums into the state.
-    fn enter(&mut self, context: &WaveContext, closing: &Closing, sums: &Sums) -> Closed {
+    fn enter(&mut self, context: &WaveContext, closing: &Closing, sums: &BucketSums) -> Closed {
         let scene = context.scene;
         let units = closing.units;
         let mut closed = Closed::default();
@@ -333,7 +256,7 @@ impl Part<'_> {
         let evidence = &mut self.evidence[i];
         evidence.squares += squares as f32;
         evidence.difference += (closing.sign * entered.luminance()) as f32;
-        evidence.hits = evidence.hits.saturating_add(sum.hits);
+        evidence.hits = evidence.hits.saturating_add(u32::try_from(sum.hits).unwrap_or(u32::MAX));
     }
 
     fn output_lobe(&mut self, closing: &Closing, k: usize, sum: &GlossySums, reflected: Rgb) {

@@ -1,16 +1,18 @@
 //! A wave: many rays against one frozen state. Select → shoot → trace → estimate here; deposits in `close`.
 //!
 //! Everything is a pure function of the state and the ray's number. Rays are shot in tasks, each a range of the first
-//! of their numbers (`order`); a task runs one stage after the other over all of its rays, so that the processor
+//! of their numbers (`order`), which ranks deal out among each other (`exchange`); a task runs one stage after the other over all of its rays, so that the processor
 //! has many independent loads to wait for at a time, and leaves its deposits sorted by buckets of patches (`deposits`).
 
+mod bucket;
 pub(crate) mod close;
 mod deposits;
+mod exchange;
 mod order;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use twinray_scene::sample::{Sobol, SobolBlock, Stream};
+use twinray_scene::sample::{Sobol, Stream};
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 pub(crate) use close::{Closing, OutputState, SourceState, Update};
@@ -19,6 +21,7 @@ use crate::direction;
 use crate::frozen::Frozen;
 use crate::glossy::GlossyPatches;
 use crate::params::{Estimator, Representation};
+use crate::peers::Among;
 use crate::stage::{Lap, Stage};
 use crate::strategies::{Fit, Witness};
 use crate::tally::Tally;
@@ -49,6 +52,8 @@ pub(crate) struct WaveContext<'a> {
     pub representation: Representation,
     /// Seed of the streams.
     pub seed: u64,
+    /// Who else shoots.
+    pub among: Among<'a>,
     /// Told at the end of every stage.
     pub lap: Lap<'a>,
 }
@@ -56,7 +61,6 @@ pub(crate) struct WaveContext<'a> {
 /// What a wave works with; memory that waves take turns to use.
 #[derive(Debug, Default)]
 pub(crate) struct Wave {
-    order: Order,
     tasks: Vec<Task>,
 }
 
@@ -66,6 +70,13 @@ struct Task {
     deposits: Deposits,
     tally: Tally,
     fit: Fit,
+}
+
+/// What a thread works with, task after task.
+#[derive(Debug, Default)]
+struct Bench {
+    lows: Vec<u32>,
+    shots: Vec<Shot>,
 }
 
 /// Where a ray started and what it met.
@@ -93,8 +104,9 @@ impl Shot {
 }
 
 impl WaveContext<'_> {
-    /// Shoots rays `first .. first + count` of the sequence against `frozen`; what they leave stays in `wave`.
-    /// `witness` judges how much a deposit's square matters. Returns sums over rays in their order.
+    /// Shoots rays `first .. first + count` of the sequence against `frozen`; what they leave stays in `wave`. Of ranks that
+    /// share the wave each shoots every so manyth task. `witness` judges how much a deposit's square matters. Returns sums
+    /// over all rays in their order.
     pub(crate) fn shoot(
         &self,
         frozen: &Frozen,
@@ -104,25 +116,29 @@ impl WaveContext<'_> {
         witness: Option<&Witness>,
         wave: &mut Wave,
     ) -> (Tally, Fit) {
-        let Wave { order, tasks } = wave;
-        order.fill(sobol, first, count);
-        (self.lap)(Stage::Order);
+        // No rank may change the number of tasks: their sums are added up in floating point.
         let wished = (count / TASK).max((count / SMALLEST_TASK).min(TASKS)).max(1);
-        let number = (wished.next_power_of_two() as usize).min(order.places());
-        tasks.resize_with(number, Task::default);
-        let runs: Vec<SobolBlock> = order.bases().map(|base| sobol.block(base)).collect();
-        let bases: Vec<u64> = order.bases().collect();
-        let places = order.places() / number;
-        tasks.par_iter_mut().enumerate().for_each_init(Vec::new, |shots, (t, task)| {
+        let order = Order::new(sobol, first, count, wished.next_power_of_two() as usize);
+        let peers = self.among.sharing(count, self.scene.len());
+        let is_mine = |t: usize| peers.is_none_or(|p| t % p.count() == p.rank());
+        let tasks = &mut wave.tasks;
+        tasks.resize_with(order.tasks(), Task::default);
+        tasks.par_iter_mut().enumerate().for_each_init(Bench::default, |bench, (t, task)| {
             (task.tally, task.fit) = Default::default();
-            (self.lap)(Stage::Wait);
-            self.start(frozen, order, &runs, &bases, t * places..(t + 1) * places, shots, task);
-            (self.lap)(Stage::Shoot);
-            self.trace(shots);
-            (self.lap)(Stage::Trace);
-            self.estimate(frozen, shots, witness, task);
+            bench.shots.clear();
+            if is_mine(t) {
+                (self.lap)(Stage::Wait);
+                self.start(frozen, &order, t, bench, task);
+                (self.lap)(Stage::Shoot);
+                self.trace(&mut bench.shots);
+                (self.lap)(Stage::Trace);
+            }
+            self.estimate(frozen, &bench.shots, witness, task);
             (self.lap)(Stage::Estimate);
         });
+        if let Some(peers) = peers {
+            exchange::gather(peers, tasks);
+        }
         let mut totals = (Tally::default(), Fit::default());
         for task in tasks.iter() {
             totals.0.add_weighted(&task.tally, 1.0);
@@ -131,27 +147,16 @@ impl WaveContext<'_> {
         totals
     }
 
-    /// Selects patches and shoots: fills `shots` with where rays start and where they go.
-    fn start(
-        &self,
-        frozen: &Frozen,
-        order: &Order,
-        runs: &[SobolBlock],
-        bases: &[u64],
-        places: std::ops::Range<usize>,
-        shots: &mut Vec<Shot>,
-        task: &mut Task,
-    ) {
-        shots.clear();
+    /// Selects patches and shoots: fills `shots` with where the rays of a task start and where they go.
+    fn start(&self, frozen: &Frozen, order: &Order, t: usize, bench: &mut Bench, task: &mut Task) {
+        let Bench { lows, shots } = bench;
+        order.fill(t, lows);
+        (self.lap)(Stage::Order);
         let mut cursor = 0;
-        for place in places {
-            for (run, block) in runs.iter().enumerate() {
-                let Some(low) = order.at(run, place) else { continue };
-                let index = bases[run] + u64::from(low);
-                task.tally.rays += 1;
-                shots.extend(self.shot(frozen, index, block.point(index as u32), &mut cursor));
-            }
-        }
+        order.each(lows, |index, block| {
+            task.tally.rays += 1;
+            shots.extend(self.shot(frozen, index, block.point(index as u32), &mut cursor));
+        });
     }
 
     /// The ray of point `u`; `None` if its direction fell below the horizon: it carries nothing.

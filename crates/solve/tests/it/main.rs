@@ -9,6 +9,7 @@ mod estimators;
 mod invariance;
 mod laws;
 mod odd_scenes;
+mod ranks;
 mod record;
 mod representation;
 mod strategies;
