@@ -118,6 +118,14 @@ impl Progress {
         self.last_line = seconds;
     }
 
+    /// Says something in between: in a line of its own where there are lines.
+    pub fn say(&self, text: &str) {
+        match &self.shown {
+            Shown::Lines => eprintln!("{text}"),
+            Shown::Nothing | Shown::Bar(_) => {}
+        }
+    }
+
     /// Takes the bar away.
     pub fn finish(&self) {
         if let Shown::Bar(bar) = &self.shown {

@@ -22,6 +22,7 @@ pub const MOST_RAYS: u64 = 1 << 56;
 
 /// A solve written down, by its schedule. K is the number of patches, G that of glossy ones.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // there is one at a time
 pub enum Record<'a> {
     /// The default schedule.
     Waves(WavesRecord<'a>),

@@ -39,12 +39,15 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     let mut last = Instant::now();
     let mut warnings = loaded.warnings.clone();
     let (mut checkpoints, mut failed) = (0, 0);
-    let solved = solving::solve((&settings, goal), &args.load.scene, &loaded, None, args.load.quiet, |solver| {
+    let solved = solving::solve((&settings, goal), &args.load.scene, &loaded, None, args.load.quiet, |solver, log| {
         if args.checkpoint.0.is_none_or(|interval| last.elapsed().as_secs_f64() < interval) {
             return;
         }
         match keeper.keep(solver) {
-            Ok(_) => checkpoints += 1,
+            Ok(error) => {
+                checkpoints += 1;
+                log.say(&format!("kept {} rays, error ≈ {:.2} %, in {}", solver.rays(), 100.0 * error, path.display()));
+            }
             // A full disk may have room again by the end, and what is known is in memory.
             Err(error) => {
                 if failed == 0 {

@@ -40,7 +40,7 @@ pub fn solve<'a>(
     loaded: &'a Loaded,
     observer: Option<Observer>,
     quiet: bool,
-    mut look: impl FnMut(&Solver),
+    mut look: impl FnMut(&Solver, &Progress),
 ) -> anyhow::Result<Solved<'a>> {
     let mut progress = Progress::new(goal, quiet);
     let mut solver = match &loaded.stored {
@@ -61,7 +61,7 @@ pub fn solve<'a>(
         if progress.wants_update() {
             progress.update(solver.rays(), solver.relative_error());
         }
-        look(&solver);
+        look(&solver, &progress);
     }
     let interrupted = interrupt::requested();
     progress.finish();

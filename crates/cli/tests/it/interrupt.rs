@@ -27,7 +27,7 @@ fn ctrl_c_writes_the_solution() {
     let place = Place::new();
     interrupt(&place, &["solve", "cornell", "-o", "kept.twin", "--patches", "2000", "--time", "600"]);
     assert_eq!(place.files(), ["kept.twin"]);
-    let kept = read_solution("kept.twin", &place.read("kept.twin"), &Limits::default()).unwrap();
+    let kept = read_solution("kept.twin", place.read("kept.twin").leak(), &Limits::default()).unwrap();
     assert!(kept.provenance.rays >= kept.light.len() as u64);
 }
 
@@ -36,12 +36,57 @@ fn ctrl_c_writes_the_reference() {
     let place = Place::new();
     interrupt(&place, &["reference", "cornell", "-o", "kept.twin", "--patches", "2000", "--error", "0.0001%"]);
     assert_eq!(place.files(), ["kept.twin"]);
-    let kept = read_solution("kept.twin", &place.read("kept.twin"), &Limits::default()).unwrap();
+    let kept = read_solution("kept.twin", place.read("kept.twin").leak(), &Limits::default()).unwrap();
     assert!(kept.provenance.rays >= kept.light.len() as u64);
+}
+
+/// What job schedulers and service managers send.
+#[test]
+fn sigterm_writes_the_solution() {
+    let place = Place::new();
+    let solve = ["solve", "cornell", "-o", "kept.twin", "--patches", "2000", "--time", "600", "--checkpoint", "never"];
+    signal(&place, &solve, "-TERM", 143);
+    assert_eq!(place.files(), ["kept.twin"]);
+    let kept = read_solution("kept.twin", place.read("kept.twin").leak(), &Limits::default()).unwrap();
+    assert!(kept.provenance.rays >= kept.light.len() as u64 && kept.record.unwrap().can_go_on());
+}
+
+/// The second Ctrl-C does not wait for anything, and leaves what was there, and nothing else.
+#[test]
+fn a_second_ctrl_c_stops_at_once() {
+    let place = Place::new();
+    // Batches of the paper preset are whole, and these take seconds.
+    let batch = ["--patches", "100", "--preset", "paper", "--batch", "3000000"];
+    place.done(&[&["solve", "cornell", "-o", "kept.twin", "--rays", "1"], &batch[..]].concat());
+    let before = place.read("kept.twin");
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin!("twinray"))
+        .args(["solve", "kept.twin", "--rays", "1e12", "--checkpoint", "0.001s"])
+        .current_dir(place.path(""))
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let mut wait_for = |word: &str| assert!(lines.any(|line| line.contains(word)), "no {word:?}");
+    wait_for("triangles");
+    send(child.id(), "-INT");
+    wait_for("the same again stops at once");
+    send(child.id(), "-INT");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(place.files(), ["kept.twin"], "nothing is left beside");
+    assert!(place.read("kept.twin") == before);
+}
+
+fn send(process: u32, signal: &str) {
+    assert!(Command::new("kill").args([signal, &process.to_string()]).status().unwrap().success());
 }
 
 /// Runs the command until it tells of progress, then interrupts it.
 fn interrupt(place: &Place, args: &[&str]) {
+    signal(place, args, "-INT", 130);
+}
+
+/// Runs the command until it tells of progress, then sends a signal; it must end with a code.
+fn signal(place: &Place, args: &[&str], signal: &str, code: i32) {
     let mut child = Command::new(assert_cmd::cargo::cargo_bin!("twinray"))
         .args(args)
         .current_dir(place.path(""))
@@ -61,8 +106,7 @@ fn interrupt(place: &Place, args: &[&str]) {
     while !said.iter().any(|line: &String| line.contains('%')) && Instant::now() < patience {
         said.extend(lines.recv_timeout(Duration::from_millis(100)));
     }
-    let interrupt = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(interrupt.success());
+    send(child.id(), signal);
     let interrupted = Instant::now();
     let status = loop {
         match child.try_wait().unwrap() {
@@ -76,6 +120,6 @@ fn interrupt(place: &Place, args: &[&str]) {
     };
     reader.join().unwrap();
     said.extend(lines.try_iter());
-    assert_eq!(status.code(), Some(130), "{said:?}");
+    assert_eq!(status.code(), Some(code), "{said:?}");
     assert!(said.iter().any(|line| line.contains("stopping at the end of this wave")), "{said:?}");
 }

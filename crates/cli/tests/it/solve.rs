@@ -54,7 +54,7 @@ fn bad_input_is_named() {
         (&["solve", "missing.glb"], ["missing.glb", "no such file"]),
         (&["solve", "floor.obj", "--preset", "paper"], ["floor.obj", "paper preset"]),
         (&["info", "bad.twin"], ["bad.twin", "is no solution file"]),
-        (&["info", "missing.twin"], ["missing.twin", "cannot be read"]),
+        (&["info", "missing.twin"], ["missing.twin", "no such file"]),
     ] {
         let run = place.run(args);
         assert_eq!(run.code, Some(2), "{args:?}: {}", run.stderr);

@@ -29,10 +29,9 @@ impl Waves {
         let sum: f64 = shares.iter().sum();
         let positive = [this.source_weight, this.output_weight, this.known.energy, this.known.irradiance];
         let fits = this.fit.sums.iter().flatten().chain([&this.fit.witnesses]);
-        if !positive.iter().chain(fits).chain(&shares).all(|x| *x >= 0.0)
-            || !positive.iter().all(|x| x.is_finite())
-            || !((sum - 1.0).abs() < 1e-6 && this.wave <= MOST_RAYS)
-        {
+        let weights = positive.iter().all(|x| x.is_finite()) && this.wave <= MOST_RAYS;
+        let positive = positive.iter().chain(fits).chain(&shares).all(|x| *x >= 0.0);
+        if !(weights && positive && (sum - 1.0).abs() < 1e-6) {
             let expected = "weights of at least 0, and shares that are 1 together";
             return Err(RecordError::Value { array: "run-0 or run-1", index: None, expected });
         }

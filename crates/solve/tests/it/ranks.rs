@@ -219,7 +219,10 @@ fn waves(record: Record) -> WavesRecord<'static> {
     };
     WavesRecord {
         deposits: w.deposits.into_owned().into(),
-        evidence: w.evidence.into_owned().into(),
+        squares: w.squares.into_owned().into(),
+        difference: w.difference.into_owned().into(),
+        hits: w.hits.into_owned().into(),
+        glossy: w.glossy.into_owned().into(),
         reflected: w.reflected.into_owned().into(),
         representatives: w.representatives.into_owned().into(),
         runs: w.runs.map(|runs| runs.map(run)),

@@ -1,0 +1,253 @@
+//! Nothing is lost: solves that go on with files, checkpoints, kills, full disks, damaged and foreign files.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use twinray::format::{Limits, StoredSolution};
+
+use crate::support::{FLOOR, Place};
+
+const CUT: [&str; 2] = ["--patches", "500"];
+
+fn rays(place: &Place, name: &str) -> u64 {
+    let bytes = place.read(name);
+    let stored = StoredSolution::open(name, &bytes, &Limits::default()).unwrap();
+    stored.verify().unwrap();
+    stored.provenance().rays
+}
+
+/// The message of a run that must be refused contains each of `words`, and changes no file.
+#[track_caller]
+fn refused(place: &Place, args: &[&str], words: &[&str]) {
+    let before: Vec<_> = place.files().into_iter().map(|name| (place.read(&name), name)).collect();
+    let run = place.run(args);
+    assert_eq!(run.code, Some(2), "{args:?}: {}", run.stderr);
+    assert!(words.iter().all(|word| run.stderr.contains(word)), "{args:?}: {words:?} in {}", run.stderr);
+    let after: Vec<_> = place.files().into_iter().map(|name| (place.read(&name), name)).collect();
+    assert!(before == after, "{args:?} changed a file");
+}
+
+#[test]
+fn a_solve_that_goes_on_is_the_unbroken_one() {
+    let place = Place::new();
+    for preset in ["default", "paper"] {
+        let solve = |args: &[&str]| place.done(&[&["solve"], args, &["--preset", preset]].concat());
+        let fresh = |rays, name| solve(&[&["cornell", "-o", name, "--rays", rays][..], &CUT].concat());
+        fresh("300k", "unbroken.twin");
+        fresh("60k", "broken.twin");
+        solve(&["broken.twin", "--rays", "150k", "--threads", "1", "--seed", "1"]);
+        // Elsewhere, and with checkpoints all the way.
+        solve(&["broken.twin", "--rays", "300k", "-o", "else.twin", "--checkpoint", "0.001s"]);
+        assert!(place.read("else.twin") == place.read("unbroken.twin"), "{preset}");
+        assert!(rays(&place, "broken.twin") < rays(&place, "else.twin"));
+        // A goal that is reached leaves the file as it is, to the bit.
+        let run = place.done(&["solve", "else.twin", "--rays", "1000"]);
+        assert!(run.stderr.contains("as good as asked for"), "{}", run.stderr);
+        assert!(place.read("else.twin") == place.read("unbroken.twin"), "{preset}");
+    }
+    let report = place.done(&["solve", "unbroken.twin", "--error", "3%", "--json"]).json();
+    assert!(report["relative_error"].as_f64().unwrap() <= 0.03 && report["rays_before"].as_u64().unwrap() >= 300_000);
+}
+
+/// Whatever stands for a scene in other commands is the scene.
+#[test]
+fn a_solution_stands_for_its_scene() {
+    let place = Place::new();
+    let small = ["--size", "64x48", "--camera", "0"];
+    let cut = [&CUT[..], &["--rays", "100k"]].concat();
+    place.done(&[&["solve", "cornell"][..], &cut].concat());
+    place.done(&[&["render", "cornell", "-o", "solved.png"][..], &cut, &small].concat());
+    let run = place.done(&[&["render", "cornell.twin", "-o", "kept.png"][..], &small].concat());
+    assert!(run.stderr.contains("rays loaded"), "{}", run.stderr);
+    assert!(place.read("kept.png") == place.read("solved.png"), "the picture of a file is that of its solve");
+    // Another camera needs no other solve.
+    let there = ["--eye", "0.1,0.4,-0.5", "--target", "0.3,0.1,0.3", "--size", "64x48"];
+    place.done(&[&["render", "cornell.twin", "-o", "there.png"][..], &there].concat());
+    place.done(&["render", "cornell.twin", "-o", "paths.png", "--method", "path", "--samples", "1", "--size", "32x32"]);
+    place.done(&["reference", "cornell.twin", "--paths", "4", "-o", "reference.twin"]);
+    place.done(&["compare", "cornell.twin", "reference.twin"]);
+    place.done(&["scene", "cornell.twin", "-o", "cornell.glb"]);
+    place.done(&["info", "cornell.twin"]);
+    refused(&place, &["render", "cornell.twin", "--rays", "1M"], &["is solved already", "twinray solve cornell.twin"]);
+    refused(&place, &["render", "reference.twin"], &["is a reference"]);
+    refused(&place, &["solve", "reference.twin", "--rays", "1M"], &["is a reference"]);
+    refused(&place, &["render", "cornell.glb", "--scene-file", "x.glb"], &["cornell.glb is none"]);
+}
+
+/// Scenes are found from where the solution is, wherever one stands, and where the user says.
+#[test]
+fn scenes_are_found_again_or_asked_for() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("a")).unwrap();
+    place.write("a/floor.obj", FLOOR);
+    place.write("a/light.twin", "");
+    let solve = ["solve", "a/floor.obj", "--unit", "cm", "--rays", "20k", "-o", "light.twin"];
+    place.done(&[&solve[..], &CUT].concat());
+    place.done(&["solve", "light.twin", "--rays", "40k"]);
+    let info = place.done(&["info", "light.twin", "--json"]).json();
+    assert_eq!((&info["source"]["file"], &info["source"]["metres_per_unit"]), (&"a/floor.obj".into(), &0.01.into()));
+    // The same file in another folder has the same bytes but for the way to its scene.
+    std::fs::rename(place.path("light.twin"), place.path("a/light.twin")).unwrap();
+    refused_in_words(&place, "a/light.twin", &["a/floor.obj, seen from its folder", "--scene-file"]);
+    place.done(&["solve", "a/light.twin", "--scene-file", "a/floor.obj", "--rays", "60k"]);
+    place.done(&["solve", "a/light.twin", "--rays", "80k"]);
+    // A scene that has changed is another.
+    place.write("a/floor.obj", FLOOR.replace("v 1 0 1", "v 1.5 0 1"));
+    refused_in_words(&place, "a/light.twin", &["another scene", "fingerprint", "--scene-file"]);
+    place.write("a/floor.obj", FLOOR);
+    for (option, value) in
+        [("--seed", "5"), ("--patches", "90"), ("--unit", "mm"), ("--preset", "paper"), ("--part", "1/2")]
+    {
+        let run = place.run(&["solve", "a/light.twin", option, value, "--rays", "90k"]);
+        assert_eq!(run.code, Some(2), "{}", run.stderr);
+        assert!(run.stderr.contains(&format!("another {option}")), "{}", run.stderr);
+    }
+}
+
+fn refused_in_words(place: &Place, name: &str, words: &[&str]) {
+    let before = place.read(name);
+    let run = place.run(&["solve", name, "--rays", "90k"]);
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
+    assert!(words.iter().all(|word| run.stderr.contains(word)), "{words:?} in {}", run.stderr);
+    assert!(before == place.read(name));
+}
+
+#[test]
+fn damaged_files_are_named() {
+    let place = Place::new();
+    place.done(&[&["solve", "cornell", "-o", "good.twin", "--rays", "20k"][..], &CUT].concat());
+    let good = place.read("good.twin");
+    let flipped = |at: usize| {
+        let mut bytes = good.clone();
+        bytes[at] ^= 16;
+        bytes
+    };
+    for (bytes, words) in [
+        (good[..good.len() / 2].to_vec(), &["cut off"][..]),
+        (good[..20].to_vec(), &["cut off"]),
+        (Vec::new(), &["is no solution file"]),
+        (flipped(good.len() - 20), &["section", "has been changed", "checksum"]),
+        (flipped(70), &["table of sections has been changed"]),
+        (flipped(8), &["version", "reads version 2"]),
+    ] {
+        place.write("bad.twin", bytes);
+        for command in
+            [&["solve", "bad.twin", "--rays", "1M"][..], &["info", "bad.twin"], &["compare", "bad.twin", "good.twin"]]
+        {
+            refused(&place, command, &[words, &["bad.twin"]].concat());
+        }
+    }
+}
+
+/// A disk that is full, or a limit on the size of files, costs a checkpoint or the end, never the file that is there.
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_the_last_file() {
+    let place = Place::new();
+    place.done(&[&["solve", "cornell", "-o", "x.twin", "--rays", "20k"][..], &CUT].concat());
+    let before = place.read("x.twin");
+    // Blocks of 512 bytes; the file of 500 patches has about 40 kB. Writing beyond is an error where the signal is ignored.
+    let script = "trap '' XFSZ; ulimit -f 20; exec \"$0\" solve x.twin --rays 200k --checkpoint 0.001s";
+    let run = Command::new("sh")
+        .args(["-c", script, assert_cmd::cargo::cargo_bin!("twinray").to_str().unwrap()])
+        .current_dir(place.path(""))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert_eq!(run.status.code(), Some(2), "{said}");
+    for words in ["warning: no checkpoint: x.twin: writing failed", "error: x.twin: writing failed", "untouched"] {
+        assert!(said.contains(words), "no {words:?} in {said}");
+    }
+    assert_eq!(said.matches("no checkpoint").count(), 1, "once is enough: {said}");
+    assert_eq!(place.files(), ["x.twin"]);
+    assert!(place.read("x.twin") == before);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_folder_that_is_read_only_is_named_before_the_work() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Place::new();
+    let folder = place.path("locked");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::set_permissions(&folder, std::fs::Permissions::from_mode(0o555)).unwrap();
+    if std::fs::write(folder.join("probe"), "").is_ok() {
+        eprintln!("skipped: this user may write into read-only folders");
+        return;
+    }
+    let run = place.run(&["solve", "cornell", "-o", "locked/x.twin", "--time", "600"]);
+    assert_eq!(run.code, Some(2));
+    assert!(run.stderr.contains("locked/x.twin: cannot write into the folder locked"), "{}", run.stderr);
+}
+
+/// Two programs never write to one place.
+#[test]
+fn a_file_that_is_being_written_is_let_alone() {
+    let place = Place::new();
+    let mut child = command(&place, &["solve", "cornell", "-o", "x.twin", "--time", "600"]).spawn().unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.map_while(Result::ok).any(|line| line.contains('%')), "no progress");
+    let run = place.run(&["solve", "cornell", "-o", "x.twin", "--rays", "1k"]);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(run.code, Some(2));
+    assert!(run.stderr.contains("x.twin: another twinray is writing it"), "{}", run.stderr);
+    // Of the killed one a file may be left beside; the next takes it over.
+    place.done(&[&["solve", "cornell", "-o", "x.twin", "--rays", "1k"][..], &CUT].concat());
+    assert_eq!(place.files(), ["x.twin"]);
+}
+
+fn command(place: &Place, args: &[&str]) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("twinray"));
+    command.args(args).current_dir(place.path("")).stderr(Stdio::piped());
+    command
+}
+
+/// Killed without warning a hundred times, at any moment: the file is always whole, never behind what was said to be kept, and
+/// in the end the same as if nothing had happened.
+#[test]
+fn a_hundred_kills_lose_nothing_that_was_kept() {
+    let place = Place::new();
+    let cut = ["--patches", "300", "--checkpoint", "0.01s", "--rays"];
+    // How long it takes to come to the first checkpoint here and now.
+    let start = Instant::now();
+    let mut child =
+        command(&place, &[&["solve", "cornell", "-o", "x.twin"], &cut[..], &["1e12"]].concat()).spawn().unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.map_while(Result::ok).any(|line| line.starts_with("kept ")));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let window = 2 * start.elapsed().as_micros() as u64;
+    std::fs::remove_file(place.path("x.twin")).unwrap();
+    let mut random = 12_345u64;
+    let mut kept = 0;
+    let mut went_on = 0;
+    for _ in 0..100 {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let there = place.path("x.twin").exists();
+        let mut args = if there { vec!["solve", "x.twin"] } else { vec!["solve", "cornell", "-o", "x.twin"] };
+        args.extend(&cut[if there { 2 } else { 0 }..]);
+        args.push("1e12");
+        let mut child = command(&place, &args).spawn().unwrap();
+        std::thread::sleep(Duration::from_micros((random >> 33) % window));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+        let said =
+            lines.filter_map(|line| Some(line.strip_prefix("kept ")?.split_once(' ')?.0.parse::<u64>().unwrap()));
+        let said = said.max().unwrap_or(kept);
+        if place.path("x.twin").exists() {
+            let now = rays(&place, "x.twin");
+            assert!(now >= said && now >= kept, "{now} rays, {said} were said to be kept, {kept} had been before");
+            went_on += u32::from(now > kept);
+            kept = now;
+        }
+    }
+    assert!(went_on >= 20, "only {went_on} of 100 came to a checkpoint");
+    let goal = (kept + 100_000).to_string();
+    place.done(&["solve", "x.twin", "--rays", &goal]);
+    place.done(&[&["solve", "cornell", "-o", "unbroken.twin"][..], &cut[..2], &["--rays", &goal]].concat());
+    assert!(place.read("x.twin") == place.read("unbroken.twin"), "after {went_on} checkpoints");
+    assert_eq!(place.files(), ["unbroken.twin", "x.twin"]);
+}
