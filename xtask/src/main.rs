@@ -27,10 +27,13 @@ const VALIDATE: Step = ("validate", "writes docs/validation.md and its plots ane
 /// Not a part of `ci` either: its figures are those of an idle machine, and nothing in it can fail.
 const BENCH: Step = ("bench", "measures, writes docs/performance.md: [--quick] [PART...]", bench);
 
+/// Not a part of `ci` yet: an MPI has to be installed.
+const MPI: Step = ("mpi", "ranks of an MPI give the bits of one process: [RAYS [SCENE:PATCHES...]]", mpi);
+
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1).unwrap_or_default();
     let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
-    let apart = [&VALIDATE, &BENCH];
+    let apart = [&VALIDATE, &BENCH, &MPI];
     let steps = apart.iter().find(|(name, ..)| wish == *name).map_or(steps, |step| vec![*step]);
     if steps.is_empty() {
         eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");
@@ -95,6 +98,13 @@ fn bench() -> Result<(), String> {
     run(command.args(std::env::args_os().skip(2)))
 }
 
+/// Whatever follows on the command line is for the check.
+fn mpi() -> Result<(), String> {
+    let mut command = Command::new("bash");
+    command.arg("mpi/test.sh").args(std::env::args_os().skip(2)).current_dir(structure::root());
+    run(&mut command)
+}
+
 fn deps() -> Result<(), String> {
     structure::dependencies_follow_the_table()?;
     structure::borrowed_crates_have_their_reasons()?;
@@ -113,7 +123,8 @@ fn cargo() -> Command {
 
 fn run(command: &mut Command) -> Result<(), String> {
     let words = command.get_args().map(|a| a.to_string_lossy());
-    let shown = format!("cargo {}", words.collect::<Vec<_>>().join(" "));
+    let program = Path::new(command.get_program()).file_stem().unwrap_or_default().to_string_lossy();
+    let shown = format!("{program} {}", words.collect::<Vec<_>>().join(" "));
     match command.status() {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(format!("{shown} ended with {status}")),
