@@ -54,7 +54,9 @@ impl Ranks {
         let (universe, level) =
             mpi::initialize_with_threading(Threading::Funneled).ok_or("MPI was started before: start it once")?;
         if level < Threading::Funneled {
-            return Err(format!("this MPI allows {level:?} threads; expected Funneled: install one built with threads"));
+            return Err(format!(
+                "this MPI allows {level:?} threads; expected Funneled: install one built with threads"
+            ));
         }
         let world = universe.world();
         Ok(Self {

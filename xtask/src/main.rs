@@ -102,7 +102,11 @@ fn bench() -> Result<(), String> {
 fn mpi() -> Result<(), String> {
     let mut command = Command::new("bash");
     command.arg("mpi/test.sh").args(std::env::args_os().skip(2)).current_dir(structure::root());
-    run(&mut command)
+    run(&mut command)?;
+    // A workspace of its own, which the steps of `ci` do not see.
+    let there = ["--manifest-path", "mpi/Cargo.toml"];
+    run(cargo().arg("fmt").args(there).arg("--check"))?;
+    run(cargo().args(["clippy", "--quiet", "--release", "--all-targets"]).args(there).args(["--", "-D", "warnings"]))
 }
 
 fn deps() -> Result<(), String> {

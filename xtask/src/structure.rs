@@ -41,7 +41,7 @@ const OUTSIDE: [&str; 11] = [
 ];
 
 /// The documents whose links and names are checked.
-const DOCUMENTS: [&str; 7] = [
+const DOCUMENTS: [&str; 8] = [
     "README.md",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
@@ -49,6 +49,7 @@ const DOCUMENTS: [&str; 7] = [
     "docs/formats.md",
     "docs/validation.md",
     "docs/performance.md",
+    "docs/scale.md",
 ];
 
 /// The root of the workspace.
