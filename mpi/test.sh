@@ -33,6 +33,28 @@ export OMPI_MCA_btl_vader_single_copy_mechanism=none
 export RAYON_NUM_THREADS="${RAYON_NUM_THREADS:-1}"
 as_root=()
 [ "$(id -u)" != 0 ] || as_root=(--allow-run-as-root)
+bin=$(realpath "${CARGO_TARGET_DIR:-target}")/release
 for ranks in ${RANKS:-2 3 4}; do
-    mpirun "${as_root[@]}" -n "$ranks" --oversubscribe "${CARGO_TARGET_DIR:-target}/release/check" "$@"
+    mpirun "${as_root[@]}" -n "$ranks" --oversubscribe "$bin/check" "$@"
 done
+
+# The command: whole, stopped and gone on with by another number of ranks, the same bytes as those of one process.
+[ $# -eq 0 ] || exit 0
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder"
+shared() { mpirun "${as_root[@]}" -n "$1" --oversubscribe "$bin/twinray" solve "${@:2}" --quiet; }
+for scene in cornell hall; do
+    "$bin/twinray" solve $scene --patches 9000 --rays 2M -o one.twin --quiet
+    shared 4 $scene --patches 9000 --rays 2M -o four.twin
+    shared 2 $scene --patches 9000 --rays 1M -o broken.twin
+    shared 3 broken.twin --rays 2M --checkpoint 0.01s
+    cmp one.twin four.twin
+    cmp one.twin broken.twin
+    echo "twinray solve $scene: 1, 4 and 2, then 3 ranks wrote the same $(stat -c %s one.twin) bytes"
+done
+# What one rank refuses ends all of them, with its code.
+status=0
+shared 2 $folder/nowhere.glb 2>refused.txt || status=$?
+grep -q "nowhere.glb: no such file" refused.txt
+[ "$status" = 2 ] || { echo "exit code $status; expected 2" >&2; exit 1; }

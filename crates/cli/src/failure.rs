@@ -1,7 +1,5 @@
 //! How the command ends: 0 done, 1 a limit exceeded, 2 bad input, 130 or 143 interrupted with the result kept.
 
-use std::process::ExitCode;
-
 use crate::interrupt;
 
 /// How a command that did not fail ended.
@@ -16,14 +14,14 @@ pub enum Ending {
 }
 
 /// The exit code; a failure is printed to standard error, the outermost reason first.
-pub fn exit_code(outcome: anyhow::Result<Ending>) -> ExitCode {
+pub fn exit_code(outcome: anyhow::Result<Ending>) -> u8 {
     match outcome {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::Exceeded) => ExitCode::from(1),
-        Ok(Ending::Interrupted) => ExitCode::from(interrupt::code()),
+        Ok(Ending::Done) => 0,
+        Ok(Ending::Exceeded) => 1,
+        Ok(Ending::Interrupted) => interrupt::code(),
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            2
         }
     }
 }

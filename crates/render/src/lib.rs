@@ -9,6 +9,7 @@ pub mod display;
 mod element;
 mod grid;
 pub mod image;
+mod lights;
 pub mod picture;
 mod reconstruct;
 pub mod reference;

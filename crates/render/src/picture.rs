@@ -14,6 +14,7 @@ use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
 use crate::image::Image;
+use crate::lights::Lights;
 use crate::reconstruct::Reconstruction;
 
 /// Settings of a picture.
@@ -73,7 +74,8 @@ const MOST_BACKS: u32 = 16;
 pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options: &PictureOptions) -> Picture {
     let reconstruction = Reconstruction::new(scene, solution);
     let traced = !options.flat && options.lobes == Lobes::Traced && solution.splits_direct_light();
-    let view = View { scene, reconstruction, flat: options.flat, traced };
+    let lamps = (traced && !solution.is_observed()).then(|| Lights::new(scene));
+    let view = View { scene, reconstruction, flat: options.flat, traced, lamps };
     let aspect = f64::from(options.width) / f64::from(options.height);
     let rows: Vec<(Vec<Pixel>, Light)> = (0..options.height)
         .into_par_iter()
@@ -87,8 +89,12 @@ pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options:
                         let (px, py) = (f64::from(x) + dx, f64::from(y) + dy);
                         let (origin, direction) =
                             camera.ray(px / f64::from(options.width), py / f64::from(options.height), aspect);
-                        let (reflected, direct) =
-                            view.seen(origin - scene.centre(), direction, lobe_numbers(options, x, y, k), &mut light);
+                        let (reflected, direct) = view.seen(
+                            origin - scene.centre(),
+                            direction,
+                            LobeNumbers::new(options, x, y, k),
+                            &mut light,
+                        );
                         sum += reflected + direct;
                         lights += direct;
                         covered += if direct.is_black() { 0.0 } else { 1.0 };
@@ -154,12 +160,21 @@ impl Light {
 }
 
 /// Numbers for a camera ray's ray into the lobe: even over the pixel's samples.
-fn lobe_numbers(options: &PictureOptions, x: u32, y: u32, k: u32) -> [f64; 2] {
-    let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
-    let mut shift = Stream::new(0, 0x10BE, pixel);
-    let n = f64::from(options.samples);
-    let stratum = (f64::from(k) + 0.5) / n + shift.uniform();
-    [stratum.fract(), (f64::from(k) * 0.618_033_988_749_894_9 + shift.uniform()).fract()]
+struct LobeNumbers {
+    place: [f64; 2],
+    /// Which ray of which pixel, for numbers that need not be even.
+    index: u64,
+}
+
+impl LobeNumbers {
+    fn new(options: &PictureOptions, x: u32, y: u32, k: u32) -> Self {
+        let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
+        let mut shift = Stream::new(0, 0x10BE, pixel);
+        let n = f64::from(options.samples);
+        let stratum = (f64::from(k) + 0.5) / n + shift.uniform();
+        let place = [stratum.fract(), (f64::from(k) * 0.618_033_988_749_894_9 + shift.uniform()).fract()];
+        Self { place, index: pixel * u64::from(options.samples) + u64::from(k) }
+    }
 }
 
 /// What camera rays look at.
@@ -168,11 +183,13 @@ struct View<'a> {
     reconstruction: Reconstruction<'a>,
     flat: bool,
     traced: bool,
+    /// What emits, where the patches do not know what their lobes send to the eye.
+    lamps: Option<Lights<'a>>,
 }
 
 impl View<'_> {
     /// Reflected and directly emitted radiance of what a camera ray meets.
-    fn seen(&self, origin: DVec3, direction: DVec3, u: [f64; 2], light: &mut Light) -> (Rgb, Rgb) {
+    fn seen(&self, origin: DVec3, direction: DVec3, u: LobeNumbers, light: &mut Light) -> (Rgb, Rgb) {
         let scene = self.scene;
         light.rays += 1;
         let Some((hit, patch)) = first_side(scene, origin, direction) else {
@@ -188,8 +205,12 @@ impl View<'_> {
                 // What the patches know bounds a single ray: a rare bright hit would be a white dot.
                 let even = (smooth.irradiance * brdf.lobe_albedo(cosine)).luminance() / PI;
                 let limit = FIREFLY * smooth.lobe[1].luminance().max(even);
-                let traced = self.lobe_ray(&hit, patch, &brdf, -direction, u);
-                smooth.lobe[0] + traced * (limit / traced.luminance().max(1e-300)).min(1.0)
+                let (traced, met) = self.lobe_ray(&hit, patch, &brdf, -direction, u.place);
+                let direct = match &self.lamps {
+                    None => smooth.lobe[0],
+                    Some(lamps) => met + self.lamp_in_lobe(lamps, &hit, patch, &brdf, -direction, u.index),
+                };
+                direct + traced * (limit / traced.luminance().max(1e-300)).min(1.0)
             }
             false => smooth.lobe[0] + smooth.lobe[1],
         };
@@ -202,24 +223,65 @@ impl View<'_> {
         (reflected, emitted)
     }
 
-    /// One sample of the lobe's reflection of everything but emitting patches.
-    fn lobe_ray(&self, hit: &SurfaceHit, patch: PatchId, brdf: &Brdf, wo: DVec3, u: [f64; 2]) -> Rgb {
+    /// Reflections follow the shading normal, as long as it is turned to the eye.
+    fn lobe_normal(&self, hit: &SurfaceHit, patch: PatchId, wo: DVec3) -> DVec3 {
+        let smooth = self.scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+        if smooth.dot(wo) > 0.0 { smooth } else { self.scene.normal(patch) }
+    }
+
+    /// One sample of the lobe's reflection of everything but emitting patches; and, weighed against
+    /// [`View::lamp_in_lobe`], of what emits where the ray ends.
+    fn lobe_ray(&self, hit: &SurfaceHit, patch: PatchId, brdf: &Brdf, wo: DVec3, u: [f64; 2]) -> (Rgb, Rgb) {
         let scene = self.scene;
-        let geometric = scene.normal(patch);
-        // Reflections follow the shading normal, as long as the ray stays above the surface.
-        let smooth = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
-        let n = if smooth.dot(wo) > 0.0 { smooth } else { geometric };
-        let Some(wi) = brdf.lobe_sample(n, wo, u).filter(|wi| geometric.dot(*wi) > 0.0) else { return Rgb::BLACK };
-        let weight = brdf.lobe_eval(n, wi, wo) * (n.dot(wi) / brdf.lobe_pdf(n, wo, wi));
+        let nothing = (Rgb::BLACK, Rgb::BLACK);
+        let n = self.lobe_normal(hit, patch, wo);
+        let above = |wi: &DVec3| scene.normal(patch).dot(*wi) > 0.0;
+        let Some(wi) = brdf.lobe_sample(n, wo, u).filter(above) else { return nothing };
+        let density = brdf.lobe_pdf(n, wo, wi);
+        let weight = brdf.lobe_eval(n, wi, wo) * (n.dot(wi) / density);
         let point = scene.point_of(hit.triangle, hit.u, hit.v);
         let Some(far) = scene.trace_from(patch, point, wi) else {
-            return weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi));
+            return (weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi)), Rgb::BLACK);
         };
-        let Some(there) = scene.patch_of(&far) else { return Rgb::BLACK };
+        let Some(there) = scene.patch_of(&far) else { return nothing };
+        let met = self.lamps.as_ref().map_or(Rgb::BLACK, |lamps| {
+            let emitted = scene.emission_at(far.triangle, far.side, far.u, far.v);
+            let other = lamps.density(point, there, scene.point_of(far.triangle, far.u, far.v));
+            weight * emitted * (density / (density + other))
+        });
         let brdf = scene.brdf_of(far.triangle, scene.color_at(far.triangle, far.u, far.v));
         // What the far end reflects, its own lobe as if it were diffuse.
         let light = self.reconstruction.smooth(there, &far).irradiance * brdf.mean_albedo() / PI;
-        weight * light
+        (weight * light, met)
+    }
+
+    /// One sample of the lobe's reflection of emitting patches, by a ray to one of them; by the balance heuristic, the
+    /// other half being what rays into the lobe meet.
+    fn lamp_in_lobe(
+        &self,
+        lamps: &Lights,
+        hit: &SurfaceHit,
+        patch: PatchId,
+        brdf: &Brdf,
+        wo: DVec3,
+        index: u64,
+    ) -> Rgb {
+        let scene = self.scene;
+        let point = scene.point_of(hit.triangle, hit.u, hit.v);
+        let Some(light) = lamps.sample(point, &mut Stream::new(0, 0x1A39, index)) else { return Rgb::BLACK };
+        // The sky is left to the rays into the lobe.
+        let Some((end, normal_there)) = light.end else { return Rgb::BLACK };
+        let (n, geometric) = (self.lobe_normal(hit, patch, wo), scene.normal(patch));
+        let cosine = n.dot(light.towards);
+        if cosine <= 0.0
+            || geometric.dot(light.towards) <= 0.0
+            || light.radiance.is_black()
+            || !scene.visible(point, geometric, end, normal_there)
+        {
+            return Rgb::BLACK;
+        }
+        let both = light.density + brdf.lobe_pdf(n, wo, light.towards);
+        light.radiance * brdf.lobe_eval(n, light.towards, wo) * (cosine / both)
     }
 }
 

@@ -107,6 +107,11 @@ impl Solution {
         self.splits_direct_light
     }
 
+    /// True if lobes are known towards an observer, or there are none: what an observer needs was summed up during the solve.
+    pub fn is_observed(&self) -> bool {
+        self.glossy.is_observed() || self.glossy_light.is_empty()
+    }
+
     /// Where the light went.
     pub fn balance(&self) -> PowerBalance {
         self.balance

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::bail;
 use serde_json::json;
 use twinray::format::{self, Method, Provenance, SolutionFile};
-use twinray::solve::Solver;
+use twinray::solve::{Peers, Solver};
 
 use crate::args::SolutionArgs;
 use crate::commands::{self, solving};
@@ -17,7 +17,10 @@ use crate::settings::Settings;
 use crate::{input, interrupt, stored};
 
 /// Runs the command.
-pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
+pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<Ending> {
+    // Of several processes the first writes and speaks.
+    let leads = peers.is_none_or(|p| p.rank() == 0);
+    let (quiet, as_json) = (args.load.quiet || !leads, args.load.json && leads);
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
     if extension(&path) != "twin" {
         bail!("{}: expected a name that ends in .twin", path.display());
@@ -27,9 +30,9 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     let start = Instant::now();
     let loaded = input::load(&args.load, None)?;
     let settings = settings(args, &loaded)?;
-    let output = Output::open(&path)?;
-    commands::print_warnings(&loaded.warnings, args.load.quiet);
-    if !args.load.quiet {
+    let output = leads.then(|| Output::open(&path)).transpose()?;
+    commands::print_warnings(&loaded.warnings, quiet);
+    if !quiet {
         eprintln!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
     }
     let loading = start.elapsed().as_secs_f64();
@@ -39,8 +42,8 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     let mut last = Instant::now();
     let mut warnings = loaded.warnings.clone();
     let (mut checkpoints, mut failed) = (0, 0);
-    let solved = solving::solve((&settings, goal), &args.load.scene, &loaded, None, args.load.quiet, |solver, log| {
-        if args.checkpoint.0.is_none_or(|interval| last.elapsed().as_secs_f64() < interval) {
+    let solved = solving::solve((&settings, goal), &args.load.scene, &loaded, None, quiet, peers, |solver, log| {
+        if !leads || args.checkpoint.0.is_none_or(|interval| last.elapsed().as_secs_f64() < interval) {
             return;
         }
         match keeper.keep(solver) {
@@ -52,7 +55,7 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
             Err(error) => {
                 if failed == 0 {
                     warnings.push(format!("no checkpoint: {error:#}"));
-                    commands::print_warnings(&warnings[warnings.len() - 1..], args.load.quiet);
+                    commands::print_warnings(&warnings[warnings.len() - 1..], quiet);
                 }
                 failed += 1;
             }
@@ -66,10 +69,10 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
     let solution = solver.solution();
     let balance = solution.balance();
     let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
-    commands::print_warnings(loss.as_slice(), args.load.quiet);
+    commands::print_warnings(loss.as_slice(), quiet);
     warnings.extend(loss);
     let fingerprint = format!("{:016x}", keeper.provenance.fingerprint);
-    if !args.load.quiet {
+    if !quiet {
         eprintln!("{}", commands::balance_line(&balance));
         if idle && !solved.interrupted {
             eprintln!(
@@ -89,7 +92,7 @@ pub fn run(args: &SolutionArgs) -> anyhow::Result<Ending> {
             settings.part.map_or(String::new(), |[k, n]| format!(" part {k}/{n}")),
         );
     }
-    if args.load.json {
+    if as_json {
         let report = json!({
             "output": path.display().to_string(),
             "scene": loaded.name, "fingerprint": fingerprint,
@@ -130,13 +133,14 @@ fn settings(args: &SolutionArgs, loaded: &Loaded) -> anyhow::Result<Settings> {
 
 /// Keeps what a solver has in a file.
 struct Keeper<'a> {
-    output: Output,
+    /// `None` where another process writes.
+    output: Option<Output>,
     loaded: &'a Loaded,
     provenance: Provenance,
 }
 
 impl<'a> Keeper<'a> {
-    fn new(loaded: &'a Loaded, settings: Settings, path: &Path, output: Output) -> Self {
+    fn new(loaded: &'a Loaded, settings: Settings, path: &Path, output: Option<Output>) -> Self {
         // The same settings give the same bytes: no date, no thread count, no goal.
         let provenance = Provenance {
             software: concat!("twinray ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -164,7 +168,9 @@ impl<'a> Keeper<'a> {
         let relative_error = error as f32;
         let provenance = Provenance { rays: record.rays(), relative_error, ..self.provenance.clone() };
         let file = SolutionFile { provenance, light, record: Some(record) };
-        self.output.put(|out| format::write_solution(&file, out))?;
+        if let Some(output) = &mut self.output {
+            output.put(|out| format::write_solution(&file, out))?;
+        }
         Ok(error)
     }
 }

@@ -2,7 +2,7 @@
 //! that keep what there is.
 
 use anyhow::anyhow;
-use twinray::solve::{Observer, Solver};
+use twinray::solve::{Observer, Peers, Solver};
 
 use crate::args::SolveArgs;
 use crate::input::Loaded;
@@ -33,22 +33,26 @@ impl Solved<'_> {
 }
 
 /// Solves until the goal or a signal; `name` is what the user called the scene. A record is gone on from. `look` is called
-/// after every wave.
+/// after every wave. With peers, all of whom do the same, a wave's rays are shared.
 pub fn solve<'a>(
     (settings, goal): (&Settings, Goal),
     name: &str,
     loaded: &'a Loaded,
     observer: Option<Observer>,
     quiet: bool,
+    peers: Option<&'a dyn Peers>,
     mut look: impl FnMut(&Solver, &Progress),
 ) -> anyhow::Result<Solved<'a>> {
     let mut progress = Progress::new(goal, quiet);
     let mut solver = match &loaded.stored {
-        None => Solver::new(&loaded.patches, settings.params(), observer).map_err(|e| anyhow!("{name}: {e}"))?,
+        None => {
+            Solver::among(&loaded.patches, settings.params(), observer, peers).map_err(|e| anyhow!("{name}: {e}"))?
+        }
         Some(stored) => {
             let record = stored.read()?.record().map_err(|e| anyhow!("{e}"))?;
             let record = record.ok_or_else(|| anyhow!("{name}: is a reference; expected a solve to go on with"))?;
-            Solver::resume(&loaded.patches, settings.params(), &record).map_err(|e| anyhow!("{name}: {e}"))?
+            Solver::resume_among(&loaded.patches, settings.params(), &record, peers)
+                .map_err(|e| anyhow!("{name}: {e}"))?
         }
     };
     let before = if loaded.stored.is_some() { solver.rays() } else { 0 };
@@ -56,14 +60,16 @@ pub fn solve<'a>(
     let limit = if let Goal::Rays(n) = goal { n } else { u64::MAX };
     // The warm start alone is too coarse to be judged: at least one wave is shot.
     let error = |solver: &Solver| if solver.is_new() { f64::INFINITY } else { solver.relative_error() };
-    while !progress.is_reached(solver.rays(), || error(&solver)) && !interrupt::requested() {
+    // Clocks and signals may say other things elsewhere: nobody stops alone.
+    let any = |yes: bool| peers.map_or(yes, |p| p.any(yes));
+    while !any(progress.is_reached(solver.rays(), || error(&solver)) || interrupt::requested()) {
         solver.advance(limit);
         if progress.wants_update() {
             progress.update(solver.rays(), solver.relative_error());
         }
         look(&solver, &progress);
     }
-    let interrupted = interrupt::requested();
+    let interrupted = any(interrupt::requested());
     progress.finish();
     let seconds = progress.seconds();
     Ok(Solved { solver, before, seconds, interrupted })

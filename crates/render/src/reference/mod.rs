@@ -6,7 +6,6 @@
 //! sample has random numbers of its own, so that means have exact standard errors. Simple before fast: whoever wants
 //! speed solves. Not here: smoothing, and the light of patches, which the reference must not know.
 
-mod lights;
 mod patches;
 mod path;
 mod pixels;

@@ -9,7 +9,7 @@ use twinray_scene::brdf::Brdf;
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 
-use super::lights::Lights;
+use crate::lights::Lights;
 
 /// How light straight from what emits is found. All three have the same mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb, Side};
 
 /// All that emits in a scene.
-pub(super) struct Lights<'a> {
+pub(crate) struct Lights<'a> {
     scene: &'a PatchScene,
     /// Emitting patches.
     patches: Vec<PatchId>,
@@ -19,7 +19,7 @@ pub(super) struct Lights<'a> {
 }
 
 /// A direction in which something shines.
-pub(super) struct LightSample {
+pub(crate) struct LightSample {
     /// Unit, away from the point.
     pub towards: DVec3,
     /// Density of the direction per solid angle, over all lights.

@@ -1,0 +1,41 @@
+//! The twinray command: paths, flags, progress, exit codes. Everything else is the `twinray` library's.
+//!
+//! A library, so that the crate `twinray-mpi` can be the same command with other processes beside it.
+
+mod args;
+mod commands;
+mod failure;
+mod input;
+mod interrupt;
+mod output;
+mod progress;
+mod settings;
+mod stored;
+
+use anyhow::bail;
+use clap::Parser;
+use twinray::solve::Peers;
+
+/// Runs the command of this process's arguments, and says with which code the process should end.
+///
+/// Of several `peers`, all of which must make this call with the same arguments, the first one writes and speaks. After
+/// code 2 the others may wait for this one in vain and must be told, or stopped.
+pub fn run(peers: Option<&dyn Peers>) -> u8 {
+    let peers = peers.filter(|p| p.count() > 1);
+    failure::exit_code(command(args::Args::parse().command, peers))
+}
+
+fn command(command: args::Command, peers: Option<&dyn Peers>) -> anyhow::Result<failure::Ending> {
+    if let (Some(peers), false) = (peers, matches!(command, args::Command::Solve(_))) {
+        bail!("{} ranks: only `twinray solve` can be shared; run other commands alone", peers.count());
+    }
+    match command {
+        args::Command::Render(args) => commands::render::run(&args),
+        args::Command::Solve(args) => commands::solve::run(&args, peers),
+        args::Command::Merge(args) => commands::merge::run(&args),
+        args::Command::Reference(args) => commands::reference::run(&args),
+        args::Command::Info(args) => commands::info::run(&args),
+        args::Command::Compare(args) => commands::compare::run(&args),
+        args::Command::Scene(args) => commands::scene::run(&args),
+    }
+}
