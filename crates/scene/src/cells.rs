@@ -104,13 +104,36 @@ impl Cells {
             Self::Strips { columns, rows, first, foot } => {
                 let (column, row) = (f64::from(cell / rows), f64::from(cell % rows));
                 let x = position_of_area((column + s) / f64::from(columns), foot);
-                let c = (row + t) / f64::from(rows) * height_at(x, foot);
-                let b = x - c * foot;
-                let mut weights = [0.0; 3];
-                weights[usize::from(first)] = 1.0 - b - c;
-                weights[(usize::from(first) + 1) % 3] = b;
-                weights[(usize::from(first) + 2) % 3] = c;
-                [weights[1], weights[2]]
+                place_in_strip(first, foot, x, (row + t) / f64::from(rows) * height_at(x, foot))
+            }
+        }
+    }
+
+    /// The corners of `cell`, three to six, running round as those of the triangle do.
+    ///
+    /// A cell under the apex of a sliver has a bend at the foot, and above the lowest row the bend makes it concave.
+    /// Such a cell begins at the bend, so that triangles fanned from the first corner always cover the cell once.
+    pub fn corners(&self, cell: u32) -> Vec<[f64; 2]> {
+        match *self {
+            Self::Regular { m } => {
+                let (i, j, upper) = self.lattice(m, cell);
+                let corners =
+                    if upper { [[i + 1, j + 1], [i, j + 1], [i + 1, j]] } else { [[i, j], [i + 1, j], [i, j + 1]] };
+                corners.map(|c| c.map(|k| f64::from(k) / f64::from(m))).to_vec()
+            }
+            Self::Strips { columns, rows, first, foot } => {
+                let (column, row) = (cell / rows, cell % rows);
+                let [left, right] =
+                    [column, column + 1].map(|k| position_of_area(f64::from(k) / f64::from(columns), foot));
+                let [low, high] = [row, row + 1].map(|k| f64::from(k) / f64::from(rows));
+                let corner = |x: f64, share: f64| place_in_strip(first, foot, x, share * height_at(x, foot));
+                let bend = (left < foot && foot < right).then_some(foot);
+                // The triangle's own side is straight: no corner at the foot of the lowest row.
+                let lower_bend = bend.filter(|_| row > 0);
+                let lower = lower_bend.into_iter().chain([right]).map(|x| corner(x, low));
+                // At the triangle's acute corners the upper side ends where the lower one does.
+                let upper = [Some(right), bend, Some(left)].into_iter().flatten().filter(|&x| height_at(x, foot) > 0.0);
+                lower.chain(upper.map(|x| corner(x, high))).chain([corner(left, low)]).collect()
             }
         }
     }
@@ -148,9 +171,20 @@ fn row_start(m: u32, j: u32) -> u32 {
     j * (2 * m - j)
 }
 
+/// The place at `x` along the longest side and the share `c` of the apex's height above it.
+fn place_in_strip(first: u8, foot: f64, x: f64, c: f64) -> [f64; 2] {
+    let b = x - c * foot;
+    let mut weights = [0.0; 3];
+    weights[usize::from(first)] = 1.0 - b - c;
+    weights[(usize::from(first) + 1) % 3] = b;
+    weights[(usize::from(first) + 2) % 3] = c;
+    [weights[1], weights[2]]
+}
+
 /// Height of the triangle at `x` along its base, as a share of the apex's height.
 fn height_at(x: f64, foot: f64) -> f64 {
-    if x < foot { x / foot } else { (1.0 - x) / (1.0 - foot).max(f64::MIN_POSITIVE) }.clamp(0.0, 1.0)
+    // With the foot at 1 the far side is upright: the height is 1 up to there, not 0 at the end.
+    if x < foot || foot == 1.0 { x / foot } else { (1.0 - x) / (1.0 - foot) }.clamp(0.0, 1.0)
 }
 
 /// Share of the area left of `x`.
@@ -218,6 +252,63 @@ mod tests {
             }
             let p = chi2::test(&back, &[n as f64 / 64.0; 64]).p_value;
             assert!(p > 1e-3, "{cells:?}: {p}");
+        }
+    }
+
+    /// Twice the area of a polygon in the plane of (u, v); the whole triangle has 1.
+    fn area_2(polygon: &[[f64; 2]]) -> f64 {
+        let [a, rest @ ..] = polygon else { return 0.0 };
+        rest.windows(2).map(|w| cross(*a, w[0], w[1])).sum()
+    }
+
+    fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    }
+
+    /// Triangles fanned from the first corner are none of them turned over, and one of them holds each point of the
+    /// cell: with the right area, the polygon is the cell.
+    #[test]
+    fn corners_are_those_of_the_cell() {
+        let mut stream = Stream::new(3, 0, 0);
+        let one_column = |rows| Cells::Strips { columns: 1, rows, first: 1, foot: 0.4 };
+        for cells in divisions().into_iter().chain([1, 2, 3].map(one_column)) {
+            for cell in 0..cells.count() {
+                let polygon = cells.corners(cell);
+                let area = area_2(&polygon);
+                assert!((area * f64::from(cells.count()) - 1.0).abs() < 1e-12, "{cells:?}, {cell}: {area}");
+                let fan: Vec<_> = polygon[1..].windows(2).map(|w| [polygon[0], w[0], w[1]]).collect();
+                assert!(fan.iter().all(|[a, b, c]| cross(*a, *b, *c) > 1e-6), "{cells:?}, {cell}: {polygon:?}");
+                let inside = |p: [f64; 2]| {
+                    let in_triangle = |[a, b, c]: &[[f64; 2]; 3]| {
+                        [(a, b), (b, c), (c, a)].iter().all(|(a, b)| cross(**a, **b, p) > -1e-12)
+                    };
+                    fan.iter().any(in_triangle)
+                };
+                for _ in 0..20 {
+                    assert!(inside(cells.point(cell, stream.uniform(), stream.uniform())), "{cells:?}, {cell}");
+                }
+                assert!(inside(cells.centre(cell)), "{cells:?}, {cell}");
+            }
+        }
+    }
+
+    #[test]
+    fn cells_under_the_apex_have_a_bend() {
+        let cells = Cells::Strips { columns: 3, rows: 2, first: 0, foot: 0.5 };
+        let corners = |cell| cells.corners(cell).len();
+        // From left to right a tip, what is under the apex, another tip; the lower cell of each first.
+        assert_eq!([0, 1, 2, 3, 4, 5].map(corners), [3, 3, 5, 6, 3, 3]);
+        let bend = cells.corners(3)[0];
+        assert!((bend[0] - 0.25).abs() < 1e-15 && (bend[1] - 0.5).abs() < 1e-15, "{bend:?}");
+    }
+
+    /// The upright side of a right-angled sliver: whatever rounding does to a point there, it has its row.
+    #[test]
+    fn points_of_an_upright_side_are_in_their_row() {
+        for (foot, x) in [(0.0, 0.0), (1.0, 1.0)] {
+            let cells = Cells::Strips { columns: 4, rows: 2, first: 0, foot };
+            let [u, v] = place_in_strip(0, foot, x, 0.9);
+            assert_eq!(cells.locate(u, v) % 2, 1, "foot {foot}");
         }
     }
 

@@ -337,6 +337,18 @@ impl PatchScene {
         t.point(t.cells.centre(self.cell_of(patch)))
     }
 
+    /// Corners of the whole cell, holes included: three to six points, counter-clockwise as seen from the patch's side.
+    ///
+    /// Triangles fanned from the first corner cover the cell once: see [`Cells::corners`].
+    pub fn cell_corners(&self, patch: PatchId) -> Vec<DVec3> {
+        let t = &self.triangles[self.triangle_of(patch) as usize];
+        let mut corners: Vec<DVec3> = t.cells.corners(self.cell_of(patch)).into_iter().map(|c| t.point(c)).collect();
+        if self.side_of(patch) == Side::Back {
+            corners[1..].reverse();
+        }
+        corners
+    }
+
     /// Barycentric weights of vertices 1 and 2 at the centre of the cell.
     pub fn cell_place(&self, patch: PatchId) -> [f64; 2] {
         let t = &self.triangles[self.triangle_of(patch) as usize];

@@ -41,6 +41,26 @@ fn areas_add_up_and_budgets_are_met() {
     }
 }
 
+/// Of every scene, and of both sides: the polygon has the cell's area and normal, its corners lie in the triangle.
+#[test]
+fn corners_go_round_their_cell() {
+    for (name, _) in builtin::NAMES {
+        let options = PatchOptions { budget: PatchBudget::Count(5_000), two_sided: true };
+        let p = PatchScene::new(&builtin::by_name(name).unwrap(), options).unwrap();
+        for patch in p.patches() {
+            let corners = p.cell_corners(patch);
+            assert!((3..=6).contains(&corners.len()), "{name}: {} corners", corners.len());
+            let fan = corners[1..].windows(2).map(|w| 0.5 * area_vector_2(corners[0], w[0], w[1]));
+            let expected = p.normal(patch) * p.cell_area(patch);
+            // Corners are f64 mixtures of f32 vertices: rounding grows with the triangle, not with the cell.
+            let triangle = p.corners(p.triangle_of(patch)).map(DVec3::length).into_iter().fold(0.0, f64::max);
+            let rounding = 1e-14 * triangle * corners[0].distance(corners[1]).max(corners[0].distance(corners[2]));
+            let off = (fan.sum::<DVec3>() - expected).length();
+            assert!(off < 1e-11 * p.cell_area(patch) + rounding, "{name}: {off} of {expected}");
+        }
+    }
+}
+
 #[test]
 fn every_patch_knows_its_place() {
     for two_sided in [false, true] {
