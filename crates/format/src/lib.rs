@@ -15,6 +15,7 @@
 
 mod context;
 mod error;
+mod export;
 mod exr;
 mod geometry;
 mod gltf;
@@ -30,6 +31,7 @@ mod twin;
 mod warning;
 
 pub use crate::error::FormatError;
+pub use crate::export::{CellTable, write_csv, write_npz, write_ply, write_vtu};
 pub use crate::exr::write_exr;
 pub use crate::gltf::write_glb;
 pub use crate::limits::Limits;

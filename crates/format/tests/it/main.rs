@@ -1,6 +1,7 @@
 //! What the crate promises, one module per promise: features, faults, round trips, pictures, real and bad files.
 
 mod any_scene;
+mod export;
 mod gltf_faults;
 mod gltf_geometry;
 mod gltf_material;
