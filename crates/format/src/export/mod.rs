@@ -14,7 +14,7 @@ mod zip;
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use twinray_scene::{PatchId, PatchScene};
+use twinray_scene::{PatchId, PatchScene, Rgb};
 use twinray_solve::{PatchLight, Solution};
 
 pub use csv::write_csv;
@@ -47,13 +47,29 @@ impl<'a> CellTable<'a> {
     /// its share of the main part says, on average over time, and its own value of the moment is left out.
     /// Paper: §2.1, L^d.
     pub fn new(scene: &'a PatchScene, solution: &Solution, provenance: &Provenance) -> Self {
-        let radiosity = |p| ((scene.emission(p) + solution.main_part(scene, p)) * PI).to_f32();
-        Self {
-            scene,
-            light: solution.patch_light(scene),
-            radiosity: scene.patches().map(radiosity).collect(),
-            provenance: pairs(provenance),
-        }
+        let main_part = |p| solution.main_part(scene, p);
+        Self::with_main_part(scene, solution.patch_light(scene), main_part, provenance)
+    }
+
+    /// The table of the light of `scene` where nothing else is known, as from a path tracer.
+    ///
+    /// Radiosity is then π emission + irradiance × mean albedo: right for Lambertian cells, and for glossy ones as if
+    /// light came evenly from all directions.
+    pub fn of_light(scene: &'a PatchScene, light: PatchLight, provenance: &Provenance) -> Self {
+        let reflected: Vec<Rgb> = (scene.patches().zip(&light.irradiance))
+            .map(|(p, e)| Rgb::from_f32(*e) * scene.brdf(p).mean_albedo() / PI)
+            .collect();
+        Self::with_main_part(scene, light, |p| reflected[p.index()], provenance)
+    }
+
+    fn with_main_part(
+        scene: &'a PatchScene,
+        light: PatchLight,
+        main_part: impl Fn(PatchId) -> Rgb,
+        provenance: &Provenance,
+    ) -> Self {
+        let radiosity = |p| ((scene.emission(p) + main_part(p)) * PI).to_f32();
+        Self { scene, light, radiosity: scene.patches().map(radiosity).collect(), provenance: pairs(provenance) }
     }
 
     /// Number of rows, K.
@@ -102,13 +118,16 @@ impl<'a> CellTable<'a> {
 /// The provenance of a solution file as pairs of name and text, and the units.
 fn pairs(p: &Provenance) -> Vec<(String, String)> {
     let pair = |name: &str, text: String| (name.to_owned(), text);
+    let seeds: Vec<String> = p.seeds.iter().map(u64::to_string).collect();
     let mut pairs = vec![
         pair("software", p.software.clone()),
         pair("scene", p.scene.clone()),
+        pair("source", p.source.file.clone()),
         pair("fingerprint", format!("{:016x}", p.fingerprint)),
         pair("method", p.method.name().to_owned()),
         pair("rays", p.rays.to_string()),
         pair("seed", p.seed.to_string()),
+        pair("seeds", seeds.join(" ")),
         pair("relative_error", p.relative_error.to_string()),
     ];
     pairs.extend(p.settings.iter().cloned());

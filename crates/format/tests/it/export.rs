@@ -54,8 +54,10 @@ fn provenance() -> Provenance {
         fingerprint: 0xfe,
         rays: 20_000,
         seed: 1,
+        seeds: vec![1],
         settings: vec![("preset".into(), "default".into())],
         relative_error: 0.25,
+        ..crate::twin::small().provenance
     }
 }
 
@@ -142,10 +144,10 @@ fn npz_comes_back() {
             if name == "provenance" {
                 let longest =
                     "fe".len().max("metres, W/m2 (or lux where radiance is in nit); colours are linear Rec. 709".len());
-                assert_eq!(head, format!("{{'descr': '<U{longest}', 'fortran_order': False, 'shape': (9, 2), }}"));
+                assert_eq!(head, format!("{{'descr': '<U{longest}', 'fortran_order': False, 'shape': (11, 2), }}"));
                 let texts: Vec<String> = data.chunks(4 * longest).map(utf_32).collect();
                 assert_eq!(texts[..4], ["software", "twinray 0.1.0", "scene", "Fürth --> \n<end_header>"]);
-                assert_eq!(texts[14..16], ["preset", "default"]);
+                assert_eq!(texts[18..20], ["preset", "default"]);
                 continue;
             }
             let (kind, width) = match name.as_str() {
@@ -300,6 +302,22 @@ fn vtu_comes_back() {
             columns.insert(array.name.clone(), rows);
         }
         assert_is_the_table(&columns, table, solution);
+    });
+}
+
+/// Of a path tracer only the light of the patches is known.
+#[test]
+fn light_alone_makes_a_table() {
+    with_table(|table, solution| {
+        let alone = CellTable::of_light(table.scene, solution.patch_light(table.scene), &provenance());
+        let scene = table.scene;
+        for p in scene.patches() {
+            let found = alone.radiosity[p.index()];
+            let reflected = solution.irradiance(p) * scene.brdf(p).mean_albedo() / std::f64::consts::PI;
+            assert_eq!(found, ((scene.emission(p) + reflected) * std::f64::consts::PI).to_f32());
+            assert!(scene.is_glossy(p) || found == table.radiosity[p.index()]);
+        }
+        assert_eq!((alone.light, alone.provenance), (table.light.clone(), table.provenance.clone()));
     });
 }
 
