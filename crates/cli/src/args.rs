@@ -32,6 +32,8 @@ pub enum Command {
     Reference(ReferenceArgs),
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
+    /// Write the light of every patch as a table or a mesh for other programs
+    Export(ExportArgs),
     /// Say how far a picture or a solution is from a reference
     Compare(CompareArgs),
     /// Write a built-in scene (or convert a file) to glTF or OBJ, so that other programs can load it
@@ -114,7 +116,7 @@ pub struct ViewArgs {
 }
 
 /// Settings of the solver.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub struct SolveArgs {
     /// Rays to shoot, such as 5000000, 5e6 or 5M [default: 400 per patch]
     #[arg(long, value_name = "N", value_parser = count, conflicts_with_all = ["time", "error"])]
@@ -332,6 +334,17 @@ pub struct InfoArgs {
     /// Scene and patches.
     #[command(flatten)]
     pub load: LoadArgs,
+}
+
+/// `twinray export`.
+#[derive(Debug, clap::Args)]
+pub struct ExportArgs {
+    /// The solution, a .twin file, and its scene.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// File to write: .npz (NumPy), .csv, .ply (mesh) or .vtu (ParaView)
+    #[arg(long, short, value_name = "FILE", required = true)]
+    pub output: PathBuf,
 }
 
 /// `twinray compare`.

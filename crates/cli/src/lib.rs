@@ -35,6 +35,7 @@ fn command(command: args::Command, peers: Option<&dyn Peers>) -> anyhow::Result<
         args::Command::Merge(args) => commands::merge::run(&args),
         args::Command::Reference(args) => commands::reference::run(&args),
         args::Command::Info(args) => commands::info::run(&args),
+        args::Command::Export(args) => commands::export::run(&args),
         args::Command::Compare(args) => commands::compare::run(&args),
         args::Command::Scene(args) => commands::scene::run(&args),
     }

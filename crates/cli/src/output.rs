@@ -4,7 +4,7 @@
 //! locked, so that two programs never write to one place.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -52,11 +52,16 @@ impl Output {
     /// Writes what there is so far and puts it in the file's place; more may follow.
     pub fn put(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
         let name = &self.name;
-        let mut file = match self.file.take() {
+        let file = match self.file.take() {
             Some(file) => file,
             None => open_beside(name, &self.beside)?,
         };
-        let written = file.set_len(0).and_then(|()| write(&mut file)).and_then(|()| file.sync_all());
+        let written = file.set_len(0).and_then(|()| {
+            let mut buffered = BufWriter::new(&file);
+            write(&mut buffered)?;
+            buffered.flush()
+        });
+        let written = written.and_then(|()| file.sync_all());
         let written = written.and_then(|()| readable(&file));
         if let Err(error) = written {
             // Half a file helps nobody, and its room may be needed.

@@ -3,6 +3,7 @@
 pub mod compare;
 mod compare_pictures;
 mod compare_solutions;
+pub mod export;
 pub mod info;
 pub mod merge;
 mod path;

@@ -50,7 +50,8 @@ pub fn write_vtu(table: &CellTable, out: impl Write) -> io::Result<()> {
     out.flush()
 }
 
-/// VTK's number of a shape: programs treat triangles and quadrilaterals better than polygons of three and four.
+/// VTK's number of a shape: programs treat triangles and quadrilaterals better than polygons of three and four. Of four
+/// corners a quadrilateral must be convex, as ours are: only a cell under an apex is concave, and it has more.
 fn cell_type(corners: usize) -> u8 {
     match corners {
         3 => 5,
