@@ -67,6 +67,8 @@ pub struct Picture {
 /// A ray into a lobe counts for at most so many times what the patches know of the lobe: the mean of its hits, or
 /// what it would reflect of evenly distributed light.
 const FIREFLY: f64 = 6.0;
+/// Candidates for the lamp that a camera ray sees in a lobe, where no observer summed lamps up.
+const LAMPS: u32 = 16;
 /// One-sided backs that a camera ray passes at most.
 const MOST_BACKS: u32 = 16;
 
@@ -247,7 +249,7 @@ impl View<'_> {
         let met = self.lamps.as_ref().map_or(Rgb::BLACK, |lamps| {
             let emitted = scene.emission_at(far.triangle, far.side, far.u, far.v);
             let other = lamps.density(point, there, scene.point_of(far.triangle, far.u, far.v));
-            weight * emitted * (density / (density + other))
+            weight * emitted * (density / (density + f64::from(LAMPS) * other))
         });
         let brdf = scene.brdf_of(far.triangle, scene.color_at(far.triangle, far.u, far.v));
         // What the far end reflects, its own lobe as if it were diffuse.
@@ -256,7 +258,8 @@ impl View<'_> {
     }
 
     /// One sample of the lobe's reflection of emitting patches, by a ray to one of them; by the balance heuristic, the
-    /// other half being what rays into the lobe meet.
+    /// other part being what rays into the lobe meet. Of several candidates one is chosen by what it would give, so that the
+    /// only ray goes where it matters.
     fn lamp_in_lobe(
         &self,
         lamps: &Lights,
@@ -268,20 +271,31 @@ impl View<'_> {
     ) -> Rgb {
         let scene = self.scene;
         let point = scene.point_of(hit.triangle, hit.u, hit.v);
-        let Some(light) = lamps.sample(point, &mut Stream::new(0, 0x1A39, index)) else { return Rgb::BLACK };
-        // The sky is left to the rays into the lobe.
-        let Some((end, normal_there)) = light.end else { return Rgb::BLACK };
         let (n, geometric) = (self.lobe_normal(hit, patch, wo), scene.normal(patch));
-        let cosine = n.dot(light.towards);
-        if cosine <= 0.0
-            || geometric.dot(light.towards) <= 0.0
-            || light.radiance.is_black()
-            || !scene.visible(point, geometric, end, normal_there)
-        {
-            return Rgb::BLACK;
+        let mut random = Stream::new(0, 0x1A39, index);
+        let (mut sum, mut chosen) = (0.0, None);
+        for _ in 0..LAMPS {
+            let Some(light) = lamps.sample(point, &mut random) else { continue };
+            // The sky is left to the rays into the lobe.
+            let Some(end) = light.end else { continue };
+            let cosine = n.dot(light.towards);
+            if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 {
+                continue;
+            }
+            let density = f64::from(LAMPS) * light.density + brdf.lobe_pdf(n, wo, light.towards);
+            let gives = light.radiance * brdf.lobe_eval(n, light.towards, wo) * (cosine / density);
+            let luminance = gives.luminance();
+            if luminance > 0.0 {
+                sum += luminance;
+                if random.uniform() * sum < luminance {
+                    chosen = Some((gives / luminance, end));
+                }
+            }
         }
-        let both = light.density + brdf.lobe_pdf(n, wo, light.towards);
-        light.radiance * brdf.lobe_eval(n, light.towards, wo) * (cosine / both)
+        match chosen {
+            Some((gives, (end, normal))) if scene.visible(point, geometric, end, normal) => gives * sum,
+            _ => Rgb::BLACK,
+        }
     }
 }
 
