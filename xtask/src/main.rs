@@ -19,6 +19,11 @@ const STEPS: &[Step] = &[
     ("docs", "cargo doc, warnings are errors", docs),
     ("examples", "every example of crates/twinray runs", examples),
     ("deps", "which crate may depend on which; links and names in the documents", deps),
+    (
+        "mpi",
+        "ranks of an MPI, installed where it is missing, give the bits of one process: [RAYS [SCENE:PATCHES...]]",
+        mpi,
+    ),
 ];
 
 /// Not a part of `ci`: it takes minutes, and its comparisons are tests of `crates/validate` already.
@@ -27,13 +32,10 @@ const VALIDATE: Step = ("validate", "writes docs/validation.md and its plots ane
 /// Not a part of `ci` either: its figures are those of an idle machine, and nothing in it can fail.
 const BENCH: Step = ("bench", "measures, writes docs/performance.md: [--quick] [PART...]", bench);
 
-/// Not a part of `ci` yet: an MPI has to be installed.
-const MPI: Step = ("mpi", "ranks of an MPI give the bits of one process: [RAYS [SCENE:PATCHES...]]", mpi);
-
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1).unwrap_or_default();
     let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
-    let apart = [&VALIDATE, &BENCH, &MPI];
+    let apart = [&VALIDATE, &BENCH];
     let steps = apart.iter().find(|(name, ..)| wish == *name).map_or(steps, |step| vec![*step]);
     if steps.is_empty() {
         eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");

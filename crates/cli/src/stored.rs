@@ -80,7 +80,10 @@ pub fn scene_of(name: &str, source: &SceneSource, wish: Option<&str>) -> anyhow:
     if builtin::by_name(&source.file).is_some() {
         return Ok(source.file.clone());
     }
-    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+    // Seen from the folder of the file itself, not of a link to it.
+    let real = std::fs::canonicalize(name).unwrap_or_else(|_| PathBuf::from(name));
+    let link = Path::new(name).parent().unwrap_or(Path::new(""));
+    let folder = if Path::new(name).is_symlink() { real.parent().unwrap_or(link) } else { link };
     let path = folder.join(&source.file);
     if !path.exists() {
         bail!(

@@ -141,12 +141,15 @@ struct Keeper<'a> {
 
 impl<'a> Keeper<'a> {
     fn new(loaded: &'a Loaded, settings: Settings, path: &Path, output: Option<Output>) -> Self {
+        // A link to a file stays one, and its scene is seen from where the file is.
+        let real = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = real.parent().unwrap_or(Path::new("")).to_owned();
         // The same settings give the same bytes: no date, no thread count, no goal.
         let provenance = Provenance {
             software: concat!("twinray ", env!("CARGO_PKG_VERSION")).to_owned(),
             method: Method::Solve,
             scene: loaded.name.clone(),
-            source: loaded.source_seen_from(path.parent().unwrap_or(Path::new(""))),
+            source: loaded.source_seen_from(&folder),
             fingerprint: loaded.patches.fingerprint(),
             rays: 0,
             seed: settings.seed,
