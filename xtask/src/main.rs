@@ -1,9 +1,11 @@
-//! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`; `cargo xtask bench`. No tool has to be installed beside Rust itself.
+//! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`; `cargo xtask bench`;
+//! `cargo xtask sanitize`, `cargo xtask mpi`. No tool has to be installed beside Rust itself, but for these two.
 //!
 //! One line a step; the first step that fails ends the run and is named. `structure` holds the checks that need no
 //! compiler, which are tests of this crate as well.
 
 mod json;
+mod sanitize;
 mod structure;
 
 use std::path::{Path, PathBuf};
@@ -32,10 +34,14 @@ const VALIDATE: Step = ("validate", "writes docs/validation.md and its plots ane
 /// Not a part of `ci` either: its figures are those of an idle machine, and nothing in it can fail.
 const BENCH: Step = ("bench", "measures, writes docs/performance.md: [--quick] [PART...]", bench);
 
+/// Nor this, which needs a nightly compiler.
+const SANITIZE: Step =
+    ("sanitize", "the code with `unsafe` under Miri and AddressSanitizer; needs a nightly", sanitize::run);
+
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1).unwrap_or_default();
     let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
-    let apart = [&VALIDATE, &BENCH];
+    let apart = [&VALIDATE, &BENCH, &SANITIZE];
     let steps = apart.iter().find(|(name, ..)| wish == *name).map_or(steps, |step| vec![*step]);
     if steps.is_empty() {
         eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");

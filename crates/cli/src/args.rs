@@ -40,6 +40,17 @@ pub enum Command {
     Scene(SceneArgs),
 }
 
+/// What a scene may ask for.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct ReadArgs {
+    /// Memory to do with, such as 800M or 8G: what needs more is refused before it starts
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub max_memory: Option<u64>,
+    /// Read textures and buffers that lie outside the scene's folder too
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
 /// How a scene is loaded and cut.
 #[derive(Debug, clap::Args)]
 pub struct LoadArgs {
@@ -61,6 +72,9 @@ pub struct LoadArgs {
     /// Unit of the file's lengths [default: m]
     #[arg(long, value_enum)]
     pub unit: Option<Unit>,
+    /// What it may ask for.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// Threads [default: all]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -411,6 +425,9 @@ impl MaxError {
 pub struct SceneArgs {
     /// A built-in scene, or a file to convert; without it the built-in scenes are listed
     pub scene: Option<String>,
+    /// What it may ask for.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// File to write: .glb or .obj (with its .mtl and textures beside it)
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -450,6 +467,27 @@ fn part(text: &str) -> Result<[u32; 2], String> {
     let numbers = text.split_once('/').and_then(|(k, n)| Some([k.trim().parse().ok()?, n.trim().parse().ok()?]));
     let good = numbers.filter(|[k, n]: &[u32; 2]| (1..=*n).contains(k));
     good.ok_or_else(|| "expected which of how many, such as 3/16, counted from 1".into())
+}
+
+/// A number of bytes that may be written as 8G, 8GB, 8GiB, 800M or 1.5e9.
+fn bytes(text: &str) -> Result<u64, String> {
+    let expected = "expected a size such as 800M, 8G or 8GiB";
+    let unit_at = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e').unwrap_or(text.len());
+    let (digits, unit) = text.split_at(unit_at);
+    let (unit, base) = match unit.strip_suffix("iB") {
+        Some(unit) => (unit, 1024f64),
+        None => (unit.strip_suffix('B').unwrap_or(unit), 1000.0),
+    };
+    let power = match unit {
+        "" if base == 1000.0 => 0,
+        "k" | "K" => 1,
+        "M" => 2,
+        "G" => 3,
+        "T" => 4,
+        _ => return Err(expected.into()),
+    };
+    let value = digits.trim().parse::<f64>().map_err(|_| expected)? * base.powi(power);
+    if (1.0..=1e18).contains(&value) { Ok(value as u64) } else { Err(expected.into()) }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

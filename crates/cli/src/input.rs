@@ -1,6 +1,6 @@
 //! From a name on the command line to what the file holds, and to patches: reading, units, cameras, completion, cutting, warnings.
 
-use std::path::{Component, Path};
+use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use twinray::format::{self, Limits, PictureFile, SceneSource};
@@ -8,7 +8,9 @@ use twinray::scene::brdf::MIN_ALPHA;
 use twinray::scene::complete::complete;
 use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, Surface, builtin};
 
-use crate::args::{LoadArgs, ViewArgs};
+use crate::args::{LoadArgs, ReadArgs, ViewArgs};
+use crate::estimate::{self, Expected, Work};
+use crate::files::{self, Folder};
 use crate::stored::{self, Stored};
 
 /// Patches where neither the user nor the scene says how many.
@@ -25,6 +27,8 @@ pub struct Loaded {
     pub cameras: Vec<Camera>,
     /// What was ignored or added, one line each.
     pub warnings: Vec<String>,
+    /// What was expected before the start.
+    pub expected: Expected,
     /// The solution file that stands for the scene, if it is one.
     pub stored: Option<Stored>,
     /// Where the scene is, as seen from the working folder, and how it was cut.
@@ -39,7 +43,7 @@ impl Loaded {
 }
 
 /// Reads a scene from a file, or builds the built-in one; warnings go to the second part.
-pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
+pub fn read(name: &str, args: &ReadArgs) -> anyhow::Result<(Scene, Vec<String>)> {
     let path = Path::new(name);
     if let Some(scene) = builtin::by_name(name) {
         return Ok((scene, Vec::new()));
@@ -48,16 +52,13 @@ pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
         let names: Vec<_> = builtin::NAMES.iter().map(|(n, _)| *n).collect();
         bail!("{name}: no such file, and no built-in scene of that name; built-in are {}", names.join(", "));
     }
-    let bytes = std::fs::read(path).with_context(|| format!("{name}: cannot be read"))?;
-    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    let mut resolver = |relative: &str| -> std::io::Result<Vec<u8>> {
-        // The readers refuse paths that leave the folder; a link or an odd component is refused here as well.
-        if Path::new(relative).components().any(|c| !matches!(c, Component::Normal(_) | Component::CurDir)) {
-            return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "outside the scene's folder"));
-        }
-        std::fs::read(folder.join(relative))
-    };
-    let reading = format::read_scene(name, &bytes, &mut resolver, &Limits::default()).map_err(|e| anyhow!("{e}"))?;
+    let limits = Limits { allow_outside: args.allow_outside, ..Limits::default() };
+    let limits = args.max_memory.map_or(limits.clone(), |bytes| limits.within(bytes));
+    let bytes = files::read(path, limits.max_file_bytes).with_context(|| format!("{name}: cannot be read"))?;
+    let folder = Folder::of(path, args.allow_outside, limits.max_file_bytes);
+    let mut resolver = |reference: &str| folder.read(reference);
+    let reading = format::read_scene(name, &bytes, &mut resolver, &limits).map_err(|e| anyhow!("{e}"))?;
+    drop(bytes);
     let faults = reading.scene.validate();
     if let Some(fault) = faults.first() {
         bail!("{name}: {fault} ({} faults in all)", faults.len());
@@ -66,13 +67,13 @@ pub fn read(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
 }
 
 /// Reads a scene, or that of a solution file.
-pub fn read_any(name: &str) -> anyhow::Result<(Scene, Vec<String>)> {
+pub fn read_any(name: &str, args: &ReadArgs) -> anyhow::Result<(Scene, Vec<String>)> {
     if !stored::is_solution(name) {
-        return read(name);
+        return read(name, args);
     }
     let file = Stored::open(name)?;
     let scene = stored::scene_of(name, &file.read()?.provenance().source, None)?;
-    read(&scene)
+    read(&scene, args)
 }
 
 /// Reads a picture.
@@ -81,10 +82,10 @@ pub fn read_picture(name: &str) -> anyhow::Result<PictureFile> {
     format::read_picture(name, &bytes, &Limits::default()).map_err(|e| anyhow!("{e}"))
 }
 
-/// Loads a scene for solving, completed with a camera and light where it lacks them.
-pub fn load(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> {
+/// Loads a scene for `work`, completed with a camera and light where it lacks them; says what is to be expected.
+pub fn load(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow::Result<Loaded> {
     if stored::is_solution(&args.scene) {
-        return load_stored(args, view);
+        return load_stored(args, view, work);
     }
     if args.scene_file.is_some() {
         bail!("--scene-file says where the scene of a .twin file is, and {} is none: leave it out", args.scene);
@@ -96,11 +97,11 @@ pub fn load(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> 
         patch_size: args.patch_size,
         two_sided: args.two_sided,
     };
-    cut(source, view, true)
+    cut(args, source, view, true, work)
 }
 
 /// The scene of a solution file, cut as it was for it.
-fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loaded> {
+fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow::Result<Loaded> {
     let name = args.scene.as_str();
     let stored = Stored::open(name)?;
     let (mut source, fingerprint, scene) = {
@@ -119,7 +120,7 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loade
     }
     source.file = stored::scene_of(name, &source, args.scene_file.as_deref())?;
     let file = source.file.clone();
-    let loaded = cut(source, view, false)?;
+    let loaded = cut(args, source, view, false, work)?;
     let found = loaded.patches.fingerprint();
     if found != fingerprint {
         bail!(
@@ -131,22 +132,30 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>) -> anyhow::Result<Loade
 
 /// Reads a scene, completes it and cuts it. A wanted camera may be lit by a lamp of its own, where there is no light, if it
 /// `decides`.
-fn cut(source: SceneSource, view: Option<&ViewArgs>, decides: bool) -> anyhow::Result<Loaded> {
-    let (mut scene, mut warnings) = read(&source.file)?;
+fn cut(
+    args: &LoadArgs,
+    source: SceneSource,
+    view: Option<&ViewArgs>,
+    decides: bool,
+    work: &Work,
+) -> anyhow::Result<Loaded> {
+    let (mut scene, mut warnings) = read(&source.file, &args.read)?;
     scale(&mut scene, source.metres_per_unit);
     let wanted = view.map(|v| override_camera(&scene, v, source.metres_per_unit)).transpose()?.flatten();
     let name = source.file.as_str();
-    let lamp_at = wanted.as_ref().filter(|_| decides);
-    for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
-        warnings.push(format!("{name}: {addition}"));
-    }
-    warnings.extend(sharp_lobes(&scene).map(|w| format!("{name}: {w}")));
     let budget = match (source.patches, source.patch_size) {
         (Some(n), _) => PatchBudget::Count(n as usize),
         (None, Some(size)) => PatchBudget::Size(size),
         (None, None) => PatchBudget::Count(scene.suggested_patches.unwrap_or(DEFAULT_PATCHES)),
     };
     let options = PatchOptions { budget, two_sided: source.two_sided };
+    let expected = estimate::expect(args, &scene, options, work)?;
+    warnings.extend(estimate::announce(args, &expected));
+    let lamp_at = wanted.as_ref().filter(|_| decides);
+    for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
+        warnings.push(format!("{name}: {addition}"));
+    }
+    warnings.extend(sharp_lobes(&scene).map(|w| format!("{name}: {w}")));
     let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
     if patches.degenerate_triangles() > 0 {
         let count = patches.degenerate_triangles();
@@ -157,7 +166,7 @@ fn cut(source: SceneSource, view: Option<&ViewArgs>, decides: bool) -> anyhow::R
     if let Some(camera) = wanted {
         cameras.insert(0, camera);
     }
-    Ok(Loaded { name: scene.name, patches, cameras, warnings, stored: None, source })
+    Ok(Loaded { name: scene.name, patches, cameras, warnings, expected, stored: None, source })
 }
 
 /// Lengths of the file to metres.

@@ -4,9 +4,12 @@
 
 mod args;
 mod commands;
+mod estimate;
 mod failure;
+mod files;
 mod input;
 mod interrupt;
+mod memory;
 mod output;
 mod progress;
 mod settings;

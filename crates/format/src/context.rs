@@ -52,7 +52,7 @@ impl<'a> Context<'a> {
             reason,
             hint: hint.to_owned(),
         };
-        let path = safe_path(reference).map_err(|reason| {
+        let path = safe_path(reference, self.limits.allow_outside).map_err(|reason| {
             fail(reason.to_owned(), "Put the file into the scene's folder and refer to it by a relative path")
         })?;
         if let Some(bytes) = self.fetched.get(&path) {
@@ -63,6 +63,7 @@ impl<'a> Context<'a> {
         })?;
         self.check_size(bytes.len(), &path)?;
         self.budget.add_input(bytes.len());
+        self.charge(0, element)?;
         let bytes: Rc<[u8]> = bytes.into();
         self.fetched.insert(path, bytes.clone());
         Ok(bytes)

@@ -12,7 +12,7 @@ use twinray_render::Image;
 use twinray_scene::texture::srgb_to_linear;
 
 use crate::error::FormatError;
-use crate::limits::Limits;
+use crate::limits::{DECODING_BYTES, Limits};
 
 /// A picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ fn read_png(name: &str, bytes: &[u8], limits: &Limits) -> Result<PictureFile, Fo
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
     let mut caps = image::Limits::default();
     // The picture at 16 bits and four channels, and as much again while it is decoded.
-    caps.max_alloc = Some(limits.max_image_texels.saturating_mul(16));
+    caps.max_alloc = Some(limits.max_image_texels.saturating_mul(DECODING_BYTES));
     reader.limits(caps);
     let decoder = reader.into_decoder().map_err(unreadable)?;
     let (width, height) = decoder.dimensions();
@@ -68,7 +68,12 @@ fn read_exr(name: &str, bytes: &[u8], limits: &Limits) -> Result<PictureFile, Fo
     // Sizes before anything is allocated for them.
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(unreadable)?;
     for header in &meta.headers {
-        within_texels(name, header.layer_size.width() as u64, header.layer_size.height() as u64, limits)?;
+        let (width, height) = (header.layer_size.width() as u64, header.layer_size.height() as u64);
+        within_texels(name, width, height, limits)?;
+        // A block is unpacked with all of its channels, wanted or not.
+        let bytes = width.saturating_mul(height).saturating_mul(header.channels.bytes_per_pixel as u64);
+        let allowed = limits.max_image_texels.saturating_mul(DECODING_BYTES);
+        within(name, "max_image_texels", bytes, allowed, "bytes in all channels")?;
     }
     let picture = read()
         .no_deep_data()

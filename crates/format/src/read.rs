@@ -55,6 +55,7 @@ pub fn read_scene(
     let mut context = Context::new(name, limits, &mut fetch);
     context.check_size(bytes.len(), name)?;
     context.budget.add_input(bytes.len());
+    context.charge(0, "file")?;
     let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
     let (stem, extension) = base.rsplit_once('.').unwrap_or((base, ""));
     let mut scene = match extension.to_ascii_lowercase().as_str() {

@@ -1,39 +1,54 @@
 //! References from one file to another: percent-decoding, `data:` URIs, and what may be asked of the disk.
 //!
 //! The rule: a scene refers to files in its own folder or below. Absolute paths, drive letters, other URI
-//! schemes and ways out through `..` are refused here, before any caller could open them.
+//! schemes and ways out through `..` are refused here, before any caller could open them. `Limits::allow_outside`
+//! permits paths of all kinds, but no scheme. Links on the disk are the caller's matter, who alone can see them.
 
 use base64::Engine as _;
 use base64::engine::DecodePaddingMode;
 use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 
-/// `reference` as a relative path with `/` between its parts and without `.` and `..`, or why not.
-pub(crate) fn safe_path(reference: &str) -> Result<String, &'static str> {
+/// `reference` as a path with `/` between its parts and without needless `.` and `..`, or why not. The path is
+/// relative and stays below the scene's folder, unless `outside` allows others.
+pub(crate) fn safe_path(reference: &str, outside: bool) -> Result<String, &'static str> {
     if reference.trim().is_empty() {
         return Err("is empty");
     }
     if reference.contains('\0') {
         return Err("contains a NUL character");
     }
-    if reference.starts_with(['/', '\\']) {
-        return Err("is an absolute path");
+    let is_absolute = reference.starts_with(['/', '\\']);
+    if is_absolute && !outside {
+        return Err("is an absolute path, outside the scene's folder (--allow-outside reads it)");
     }
     // A colon in the first part is a URI scheme or a drive letter; file names with colons do not travel anyway.
     let first = reference.split(['/', '\\']).next().unwrap_or_default();
-    if first.contains(':') {
+    let is_drive = first.len() == 2 && first.starts_with(|c: char| c.is_ascii_alphabetic());
+    if first.contains(':') && !(outside && is_drive) {
         return Err("is an absolute URI or path");
     }
     let mut parts: Vec<&str> = Vec::new();
     for part in reference.split(['/', '\\']) {
         match part {
             "" | "." => {}
-            ".." => {
-                parts.pop().ok_or("leaves the scene's folder through \"..\"")?;
-            }
+            // Above the root there is nothing; above a relative path's start there is, if that is allowed.
+            ".." if parts.last().is_some_and(|&p| p != "..") => drop(parts.pop()),
+            ".." if is_absolute => {}
+            ".." if outside => parts.push(".."),
+            ".." => return Err("leaves the scene's folder through \"..\" (--allow-outside reads it)"),
             _ => parts.push(part),
         }
     }
-    if parts.is_empty() { Err("names no file") } else { Ok(parts.join("/")) }
+    if parts.is_empty() {
+        return Err("names no file");
+    }
+    // Two slashes at the front name a host where Windows reads them.
+    let root = match reference.as_bytes() {
+        [b'/' | b'\\', b'/' | b'\\', ..] => "//",
+        [b'/' | b'\\', ..] => "/",
+        _ => "",
+    };
+    Ok(format!("{root}{}", parts.join("/")))
 }
 
 /// `text` with `%20` and the like replaced; left as it is if the result is not UTF-8.
@@ -85,7 +100,7 @@ mod tests {
     fn only_the_scenes_own_folder_is_reachable() {
         let good = [("a.bin", "a.bin"), ("./t/../a b.png", "a b.png"), ("t\\wood.png", "t/wood.png"), ("a..b", "a..b")];
         for (reference, path) in good {
-            assert_eq!(safe_path(reference).as_deref(), Ok(path), "{reference}");
+            assert_eq!(safe_path(reference, false).as_deref(), Ok(path), "{reference}");
         }
         let bad = [
             "",
@@ -104,7 +119,30 @@ mod tests {
             "a\0b",
         ];
         for reference in bad {
-            assert!(safe_path(reference).is_err(), "{reference}");
+            assert!(safe_path(reference, false).is_err(), "{reference}");
+        }
+    }
+
+    #[test]
+    fn outside_is_reachable_where_that_is_allowed() {
+        let good = [
+            ("a/../../b.png", "../b.png"),
+            ("../../b.png", "../../b.png"),
+            ("/etc/../a.png", "/a.png"),
+            ("/../a.png", "/a.png"),
+            ("C:\\t\\a.png", "C:/t/a.png"),
+            ("\\\\host\\share\\a.png", "//host/share/a.png"),
+            ("t/../a.png", "a.png"),
+        ];
+        for (reference, path) in good {
+            assert_eq!(safe_path(reference, true).as_deref(), Ok(path), "{reference}");
+        }
+        for reference in ["", "/", "..\0", "http://host/a", "file:///a", "ab:c"] {
+            assert!(safe_path(reference, true).is_err(), "{reference}");
+        }
+        for reference in ["/etc/passwd", "../a"] {
+            let refusal = safe_path(reference, false).unwrap_err();
+            assert!(refusal.contains("--allow-outside"), "{refusal}");
         }
     }
 

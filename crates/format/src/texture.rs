@@ -10,7 +10,7 @@ use std::sync::Arc;
 use image::{ImageDecoder, ImageFormat, ImageReader};
 use twinray_scene::TextureImage;
 
-use crate::limits::Limits;
+use crate::limits::{DECODING_BYTES, Limits};
 
 /// The pictures decoded so far.
 #[derive(Default)]
@@ -18,8 +18,8 @@ pub(crate) struct Pictures {
     images: Vec<Arc<TextureImage>>,
     brightest: Vec<[f64; 3]>,
     texels: u64,
-    /// Texels decoded, before any shrinking: time is limited too.
-    decoded: u64,
+    /// Work so far, in texels, before any shrinking: time is limited too.
+    work: u64,
 }
 
 impl Pictures {
@@ -28,12 +28,11 @@ impl Pictures {
     pub(crate) fn add(&mut self, name: &str, bytes: &[u8], limits: &Limits) -> Result<(usize, Option<String>), String> {
         // Sixteen 4096² pictures with the default limits, a few seconds; then the same picture again and again
         // would cost time without end.
-        if self.decoded > limits.max_texels.saturating_mul(8) {
+        if self.work > limits.max_texels.saturating_mul(8) {
             return Err("too many texels were decoded before it (Limits::max_texels)".to_owned());
         }
-        let mut image = decode(name, bytes, limits)?;
+        let mut image = decode(name, bytes, limits, &mut self.work)?;
         let full = (image.width, image.height);
-        self.decoded += u64::from(full.0) * u64::from(full.1);
         let room = limits.max_texels.saturating_sub(self.texels);
         while u64::from(image.width) * u64::from(image.height) > room {
             if image.width == 1 && image.height == 1 {
@@ -62,7 +61,10 @@ impl Pictures {
     }
 }
 
-fn decode(name: &str, bytes: &[u8], limits: &Limits) -> Result<TextureImage, String> {
+/// Decodes a picture; `work` grows by what that costs, whether it succeeds or not: a damaged picture shows it at its end.
+fn decode(name: &str, bytes: &[u8], limits: &Limits, work: &mut u64) -> Result<TextureImage, String> {
+    // Some decoders look at all bytes before they know a size.
+    *work = work.saturating_add(bytes.len() as u64 / 4);
     // The bytes know better than the name; only TGA has no mark of its own.
     let format = match image::guess_format(bytes) {
         Ok(format) => format,
@@ -71,8 +73,7 @@ fn decode(name: &str, bytes: &[u8], limits: &Limits) -> Result<TextureImage, Str
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut caps = image::Limits::default();
-    // Decoders keep at most the picture at 8 bytes a texel and as much again while they work.
-    caps.max_alloc = Some(limits.max_image_texels.saturating_mul(16));
+    caps.max_alloc = Some(limits.max_image_texels.saturating_mul(DECODING_BYTES));
     reader.limits(caps);
     let decoder = reader.into_decoder().map_err(|error| format!("cannot be decoded ({error})"))?;
     let (width, height) = decoder.dimensions();
@@ -85,6 +86,7 @@ fn decode(name: &str, bytes: &[u8], limits: &Limits) -> Result<TextureImage, Str
         let allowed = limits.max_image_texels;
         return Err(format!("has {width}×{height} texels, more than Limits::max_image_texels = {allowed}"));
     }
+    *work = work.saturating_add(texels);
     let picture = image::DynamicImage::from_decoder(decoder).map_err(|error| format!("cannot be decoded ({error})"))?;
     let rgba = picture.into_rgba8().into_raw();
     Ok(TextureImage { name: name.to_owned(), width, height, rgba })

@@ -3,10 +3,11 @@
 //! Lives here: the warning and the list that collects them without growing past a bound, whatever the file does.
 //! Not here: faults that end the reading (`error`).
 
+use std::collections::HashSet;
 use std::fmt;
 
 /// Something the reader changed, ignored or guessed. The scene beside it is usable.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Warning {
     /// Name of the file concerned.
     pub file: String,
@@ -29,6 +30,8 @@ const MAX_WARNINGS: usize = 200;
 #[derive(Default)]
 pub(crate) struct Warnings {
     list: Vec<Warning>,
+    /// Those of the list, since a file may have as many causes for the same one as it has lines.
+    seen: HashSet<Warning>,
     left_out: usize,
 }
 
@@ -39,7 +42,7 @@ impl Warnings {
             return;
         }
         let warning = Warning { file: file.to_owned(), element: element.into(), message: message.into() };
-        if !self.list.contains(&warning) {
+        if self.seen.insert(warning.clone()) {
             self.list.push(warning);
         }
     }

@@ -39,6 +39,14 @@ pub(crate) fn build(triangles: &[[[f32; 3]; 3]]) -> Tree {
     Tree { nodes, leaves, bounds: Some([bounds.low, bounds.high]), left_out }
 }
 
+/// Memory that [`build`] needs beside the tree and the triangles, in bytes: a list of boxes, and a binary tree whose
+/// leaves hold six triangles on average, each of its inner nodes an allocation of its own.
+pub(crate) fn scratch_bytes(triangles: usize) -> usize {
+    const TRIANGLES_OF_A_LEAF: usize = 6;
+    const ALLOCATION: usize = 16;
+    triangles * size_of::<Item>() + triangles / TRIANGLES_OF_A_LEAF * (2 * size_of::<Binary>() + ALLOCATION)
+}
+
 /// Appends the wide node that `binary` becomes, parents before children, and returns where it went.
 fn lay_out_node(binary: &Binary, triangles: &[[[f32; 3]; 3]], nodes: &mut Vec<Node>, leaves: &mut Vec<Leaf>) -> Child {
     let mut children = Vec::with_capacity(LANES);

@@ -11,6 +11,9 @@ use crate::traverse;
 #[cfg(target_arch = "x86_64")]
 use crate::wide::{Avx2, Avx512};
 
+/// Bytes of a tree for each of its triangles, see [`Bvh`].
+const EXPECTED_PER_TRIANGLE: usize = 57;
+
 /// Triangles, ready to be met by rays: a tree of bounding boxes with eight children a node and up
 /// to eight triangles a leaf.
 ///
@@ -89,6 +92,16 @@ impl Bvh {
     /// Memory of the tree in bytes, the triangles in it included.
     pub fn bytes(&self) -> usize {
         size_of::<Bvh>() + self.nodes.capacity() * size_of::<Node>() + self.leaves.capacity() * size_of::<Leaf>()
+    }
+
+    /// About how much memory a tree over so many triangles takes, in bytes: of the tree, and at the most while it is
+    /// built, the tree included. The triangles that are handed in are not counted.
+    ///
+    /// Both are a little more than what scenes take. Only triangles that no plane parts, such as many of one and the same
+    /// place, need more than twice as much.
+    pub fn expected_bytes(triangles: usize) -> [usize; 2] {
+        let tree = size_of::<Bvh>() + size_of::<Node>() + size_of::<Leaf>() + EXPECTED_PER_TRIANGLE * triangles;
+        [tree, tree + build::scratch_bytes(triangles)]
     }
 
     /// Lowest and highest corner of the box around all triangles that can be hit; `None` if there

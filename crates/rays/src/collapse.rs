@@ -92,6 +92,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes hours there, and has no unsafe code to look at")]
     fn the_choice_costs_what_was_promised_and_less_than_a_greedy_one() {
         // A lattice of small triangles that is dense in one corner.
         let mut items: Vec<Item> = (0..3000u32)

@@ -39,21 +39,17 @@ pub enum Cells {
 impl Cells {
     /// A division of the triangle into cells of about `area` each (square metres; infinite gives one cell).
     pub fn of_area(vertices: [DVec3; 3], area: f64) -> Self {
-        let triangle = 0.5 * crate::geom::area_vector_2(vertices[0], vertices[1], vertices[2]).length();
-        let wanted = (triangle / area).min(MAX_PER_SIDE * MAX_PER_SIDE);
         let side = |i: usize| vertices[(i + 1) % 3] - vertices[i];
-        let first = (0..3).max_by(|&a, &b| side(a).length().total_cmp(&side(b).length())).unwrap_or(0);
-        let length = side(first).length();
-        let height = 2.0 * triangle / length;
-        if wanted > 1.5 && length > SLIVER * height {
-            // Cells about as long as high: rows from the mean height, columns from what is left of the budget.
-            let rows = (0.5 * height / area.sqrt()).round().max(1.0);
-            let columns = (wanted / rows).round().clamp(1.0, MAX_PER_SIDE * MAX_PER_SIDE / rows);
-            let apex = vertices[(first + 2) % 3] - vertices[first];
-            let foot = (apex.dot(side(first)) / (length * length)).clamp(0.0, 1.0);
-            return Self::Strips { columns: columns as u32, rows: rows as u32, first: first as u8, foot };
+        match Outline::of(vertices).cut(area) {
+            Cut::Regular { m } => Self::Regular { m },
+            Cut::Strips { columns, rows } => {
+                let first = longest_side(vertices);
+                let (base, length) = (side(first), side(first).length());
+                let apex = vertices[(first + 2) % 3] - vertices[first];
+                let foot = (apex.dot(base) / (length * length)).clamp(0.0, 1.0);
+                Self::Strips { columns, rows, first: first as u8, foot }
+            }
         }
-        Self::Regular { m: wanted.sqrt().round().clamp(1.0, MAX_PER_SIDE) as u32 }
     }
 
     /// Number of cells.
@@ -164,6 +160,60 @@ impl Cells {
         let k = cell - row_start(m, j);
         (k / 2, j, k % 2 == 1)
     }
+}
+
+/// What of a triangle decides the number of its cells.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outline {
+    /// m².
+    area: f64,
+    /// Longest side, m.
+    length: f64,
+}
+
+enum Cut {
+    Regular { m: u32 },
+    Strips { columns: u32, rows: u32 },
+}
+
+impl Outline {
+    pub(crate) fn of(vertices: [DVec3; 3]) -> Self {
+        let first = longest_side(vertices);
+        Self {
+            area: 0.5 * crate::geom::area_vector_2(vertices[0], vertices[1], vertices[2]).length(),
+            length: (vertices[(first + 1) % 3] - vertices[first]).length(),
+        }
+    }
+
+    pub(crate) fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Number of cells of about `area` each.
+    pub(crate) fn count(&self, area: f64) -> u32 {
+        match self.cut(area) {
+            Cut::Regular { m } => m * m,
+            Cut::Strips { columns, rows } => columns * rows,
+        }
+    }
+
+    fn cut(&self, area: f64) -> Cut {
+        let wanted = (self.area / area).min(MAX_PER_SIDE * MAX_PER_SIDE);
+        let height = 2.0 * self.area / self.length;
+        if wanted > 1.5 && self.length > SLIVER * height {
+            // Cells about as long as high: rows from the mean height, columns from what is left of the budget.
+            let rows = (0.5 * height / area.sqrt()).round().clamp(1.0, MAX_PER_SIDE);
+            let columns = (wanted / rows).round().clamp(1.0, MAX_PER_SIDE * MAX_PER_SIDE / rows);
+            return Cut::Strips { columns: columns as u32, rows: rows as u32 };
+        }
+        Cut::Regular { m: wanted.sqrt().round().clamp(1.0, MAX_PER_SIDE) as u32 }
+    }
+}
+
+/// Number of the vertex at which the longest side begins.
+fn longest_side(vertices: [DVec3; 3]) -> usize {
+    let length = |i: usize| (vertices[(i + 1) % 3] - vertices[i]).length();
+    (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0)
 }
 
 /// Index of the first cell of row `j`: rows get shorter by two cells each.
@@ -309,6 +359,18 @@ mod tests {
             let cells = Cells::Strips { columns: 4, rows: 2, first: 0, foot };
             let [u, v] = place_in_strip(0, foot, x, 0.9);
             assert_eq!(cells.locate(u, v) % 2, 1, "foot {foot}");
+        }
+    }
+
+    /// However small the cells that are asked for: no triangle gets more than indices can number.
+    #[test]
+    fn cells_of_no_size_are_as_many_as_can_be() {
+        let sliver = [DVec3::ZERO, DVec3::new(1e6, 0.0, 0.0), DVec3::new(5e5, 1e5, 0.0)];
+        let square = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for area in [1e-18, 1e-300, 0.0] {
+            for vertices in [sliver, square] {
+                assert_eq!(Cells::of_area(vertices, area).count(), 900_000_000, "{area}");
+            }
         }
     }
 

@@ -7,6 +7,7 @@ pub mod camera;
 pub mod cells;
 pub mod complete;
 pub mod environment;
+mod estimate;
 mod fingerprint;
 pub mod geom;
 pub mod patch;
@@ -20,5 +21,6 @@ pub use authored::{
 };
 pub use bvh::SurfaceHit;
 pub use camera::{Camera, Projection};
+pub use estimate::{Estimate, estimate};
 pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
 pub use rgb::Rgb;

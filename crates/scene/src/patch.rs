@@ -10,9 +10,9 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::authored::{Material, Opacity, Scene, Surface, TextureImage, TextureRef};
+use crate::authored::{Material, Mesh, Opacity, Scene, Surface, TextureImage, TextureRef};
 use crate::brdf::{Brdf, Ggx, Phong};
-use crate::cells::Cells;
+use crate::cells::{Cells, Outline};
 use crate::environment::EnvironmentLight;
 use crate::geom::area_vector_2;
 use crate::rgb::Rgb;
@@ -159,51 +159,26 @@ impl PatchScene {
         let (centre, radius) = bounds(scene).ok_or(PatchError::Empty)?;
         let mut triangles = Vec::new();
         let mut attributes = Vec::new();
-        let mut passed = 0;
-        let mut degenerate = 0;
-        for instance in &scene.instances {
-            let mesh = &scene.meshes[instance.mesh];
-            let material = &scene.materials[mesh.material];
-            if material.transmissive {
-                passed += mesh.triangles.len();
-                continue;
-            }
-            let place = instance.transform;
-            // Mirrored instances keep their front side outside: the winding follows the determinant (glTF 2.0, 3.5.2).
-            let mirrored = place.matrix3.determinant() < 0.0;
-            let normal_matrix = normal_matrix(place.matrix3);
-            let world: Vec<DVec3> = mesh.positions.iter().map(|p| place.transform_point3(vec(*p)) - centre).collect();
-            for corner in &mesh.triangles {
-                let order = if mirrored { [0, 2, 1] } else { [0, 1, 2] };
-                let corner = order.map(|k| corner[k] as usize);
-                let vertices = corner.map(|k| world[k].as_vec3().to_array());
-                let [a, b, c] = vertices.map(vec);
-                let across = area_vector_2(a, b, c);
-                let in_range = vertices.iter().flatten().all(|x| x.abs() <= MAX_COORDINATE);
-                if !(in_range && across.length() > 0.0) {
-                    degenerate += 1;
-                    continue;
-                }
-                triangles.push(Triangle {
-                    vertices,
-                    normal: across.normalize(),
-                    cells: Cells::Regular { m: 1 },
-                    cell_area: 0.5 * across.length(),
-                    first_patch: 0,
-                    material: mesh.material as u32,
-                    two_sided: material.two_sided || options.two_sided,
-                    metallic: 0.0,
-                    roughness: 1.0,
-                });
-                attributes.push(Attributes {
-                    normals: mesh
-                        .normals
-                        .as_ref()
-                        .map(|n| corner.map(|k| (normal_matrix * vec(n[k])).normalize_or_zero().as_vec3().to_array())),
-                    texcoords: mesh.texcoords.as_ref().map(|t| corner.map(|k| t[k])),
-                });
-            }
-        }
+        let left_out = place(scene, centre, &mut |placed| {
+            let Placed { mesh, corner, vertices, across, .. } = placed;
+            triangles.push(Triangle {
+                vertices,
+                normal: across.normalize(),
+                cells: Cells::Regular { m: 1 },
+                cell_area: 0.5 * across.length(),
+                first_patch: 0,
+                material: mesh.material as u32,
+                two_sided: scene.materials[mesh.material].two_sided || options.two_sided,
+                metallic: 0.0,
+                roughness: 1.0,
+            });
+            attributes.push(Attributes {
+                normals: mesh.normals.as_ref().map(|n| {
+                    corner.map(|k| (placed.normal_matrix * vec(n[k])).normalize_or_zero().as_vec3().to_array())
+                }),
+                texcoords: mesh.texcoords.as_ref().map(|t| corner.map(|k| t[k])),
+            });
+        });
         if triangles.is_empty() {
             return Err(PatchError::Empty);
         }
@@ -231,8 +206,8 @@ impl PatchScene {
             coverage: Vec::new(),
             centre,
             radius,
-            passed,
-            degenerate,
+            passed: left_out.passed,
+            degenerate: left_out.degenerate,
         };
         debug_assert_eq!(this.kernel.left_out(), 0, "a patch that no ray can meet");
         this.average_materials();
@@ -524,8 +499,9 @@ impl PatchScene {
 
     /// Fills the patches' means of textures: colour, emission, coverage; and the triangles' metalness and roughness.
     fn average_materials(&mut self) {
+        let texels = self.images.iter().map(|i| f64::from(i.width) * f64::from(i.height)).fold(0.0, f64::max);
         let means: Vec<TriangleMeans> =
-            (0..self.triangles.len() as u32).into_par_iter().map(|i| self.triangle_means(i)).collect();
+            (0..self.triangles.len() as u32).into_par_iter().map(|i| self.triangle_means(i, texels)).collect();
         let holes = self.holes;
         let emits = self.materials.iter().any(|m| !m.emission.is_black());
         for (t, means) in self.triangles.iter_mut().zip(means) {
@@ -549,7 +525,8 @@ impl PatchScene {
         }
     }
 
-    fn triangle_means(&self, triangle: u32) -> TriangleMeans {
+    /// Means over a triangle's cells; `texels` are those of the largest picture.
+    fn triangle_means(&self, triangle: u32, texels: f64) -> TriangleMeans {
         let t = &self.triangles[triangle as usize];
         let material = &self.materials[t.material as usize];
         let texel = base_texel(&material.surface);
@@ -570,7 +547,7 @@ impl PatchScene {
         };
         if has_uv && mr_texture.is_some() {
             let whole = Cells::Regular { m: 1 };
-            let n = self.samples_per_cell(triangle, 1);
+            let n = self.samples_per_cell(triangle, 1, texels);
             let at = |[u, v]: [f64; 2]| self.texture_at(mr_texture, triangle, Encoding::Linear, u, v).0;
             let mean = (0..n).map(|k| at(spread_point(&whole, 0, k))).sum::<Rgb>() / f64::from(n);
             // glTF: roughness in green, metalness in blue.
@@ -580,7 +557,7 @@ impl PatchScene {
             return means;
         }
         let count = t.cells.count();
-        let n = self.samples_per_cell(triangle, count);
+        let n = self.samples_per_cell(triangle, count, texels);
         let (mut colors, mut emissions, mut coverages) = (Vec::new(), Vec::new(), Vec::new());
         for cell in 0..count {
             let (mut color, mut emission, mut present) = (Rgb::BLACK, Rgb::BLACK, 0.0);
@@ -604,11 +581,10 @@ impl PatchScene {
     }
 
     /// Sample points for a cell's mean: about one per texel, between 4 and 64.
-    fn samples_per_cell(&self, triangle: u32, cells: u32) -> u32 {
+    fn samples_per_cell(&self, triangle: u32, cells: u32, texels: f64) -> u32 {
         let Some(t) = self.attributes[triangle as usize].texcoords else { return 1 };
         let d = |i: usize, k: usize| f64::from(t[i][k] - t[0][k]);
         let uv_area = 0.5 * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0)).abs();
-        let texels = self.images.iter().map(|i| f64::from(i.width) * f64::from(i.height)).fold(0.0, f64::max);
         ((uv_area * texels / f64::from(cells)).ceil() as u32).clamp(4, 64)
     }
 }
@@ -621,7 +597,7 @@ fn spread_point(cells: &Cells, cell: u32, k: u32) -> [f64; 2] {
     cells.point(cell, s, t)
 }
 
-struct TriangleMeans {
+pub(crate) struct TriangleMeans {
     color: Vec<[f32; 3]>,
     emission: Vec<[f32; 3]>,
     coverage: Vec<f32>,
@@ -652,7 +628,7 @@ fn normal_matrix(m: DMat3) -> DMat3 {
 }
 
 /// Centre of the bounding box of all placed vertices, and the largest distance from it.
-fn bounds(scene: &Scene) -> Option<(DVec3, f64)> {
+pub(crate) fn bounds(scene: &Scene) -> Option<(DVec3, f64)> {
     let points = || {
         scene.instances.iter().flat_map(|i| {
             let mesh = &scene.meshes[i.mesh];
@@ -667,12 +643,81 @@ fn bounds(scene: &Scene) -> Option<(DVec3, f64)> {
     Some((centre, radius))
 }
 
+/// A triangle where it stands.
+pub(crate) struct Placed<'a> {
+    pub mesh: &'a Mesh,
+    /// Its vertices in the mesh, counter-clockwise from the front in the world.
+    pub corner: [usize; 3],
+    /// Its vertices relative to the scene's centre.
+    pub vertices: [[f32; 3]; 3],
+    /// Twice its area vector.
+    pub across: DVec3,
+    normal_matrix: DMat3,
+}
+
+impl Placed<'_> {
+    pub fn corners(&self) -> [DVec3; 3] {
+        self.vertices.map(vec)
+    }
+}
+
+/// Triangles that are not placed.
+#[derive(Default)]
+pub(crate) struct LeftOut {
+    passed: usize,
+    degenerate: usize,
+}
+
+/// Calls `each` with every triangle that a ray can meet, in order.
+pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) -> LeftOut {
+    let mut left_out = LeftOut::default();
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh];
+        if scene.materials[mesh.material].transmissive {
+            left_out.passed += mesh.triangles.len();
+            continue;
+        }
+        let place = instance.transform;
+        // Mirrored instances keep their front side outside: the winding follows the determinant (glTF 2.0, 3.5.2).
+        let mirrored = place.matrix3.determinant() < 0.0;
+        let normal_matrix = normal_matrix(place.matrix3);
+        let world: Vec<DVec3> = mesh.positions.iter().map(|p| place.transform_point3(vec(*p)) - centre).collect();
+        for corner in &mesh.triangles {
+            let order = if mirrored { [0, 2, 1] } else { [0, 1, 2] };
+            let corner = order.map(|k| corner[k] as usize);
+            let vertices = corner.map(|k| world[k].as_vec3().to_array());
+            let [a, b, c] = vertices.map(vec);
+            let across = area_vector_2(a, b, c);
+            let in_range = vertices.iter().flatten().all(|x| x.abs() <= MAX_COORDINATE);
+            if !(in_range && across.length() > 0.0) {
+                left_out.degenerate += 1;
+                continue;
+            }
+            each(Placed { mesh, corner, vertices, across, normal_matrix });
+        }
+    }
+    left_out
+}
+
 /// Chooses every triangle's cells and numbers the patches.
 fn divide(triangles: &mut [Triangle], budget: PatchBudget) -> Result<(), PatchError> {
-    let cut = |t: &Triangle, area: f64| Cells::of_area([t.vertex(0), t.vertex(1), t.vertex(2)], area);
-    let count = |area: f64| -> f64 {
-        triangles.par_iter().map(|t| u64::from(cut(t, area).count()) * u64::from(sides(t))).sum::<u64>() as f64
-    };
+    let vertices = |t: &Triangle| [t.vertex(0), t.vertex(1), t.vertex(2)];
+    let outlines: Vec<_> = triangles.par_iter().map(|t| (Outline::of(vertices(t)), sides(t))).collect();
+    let (area, _) = cell_area(&outlines, budget)?;
+    let mut next = 0;
+    for t in triangles.iter_mut() {
+        t.cells = Cells::of_area(vertices(t), area);
+        t.cell_area /= f64::from(t.cells.count());
+        t.first_patch = next;
+        next += sides(t) * t.cells.count();
+    }
+    Ok(())
+}
+
+/// The area of a cell that keeps to `budget`, and the number of patches that it gives. Outlines come with the number
+/// of their triangle's sides.
+pub(crate) fn cell_area(outlines: &[(Outline, u32)], budget: PatchBudget) -> Result<(f64, u64), PatchError> {
+    let count = |area: f64| -> u64 { outlines.par_iter().map(|(o, s)| u64::from(o.count(area)) * u64::from(*s)).sum() };
     let area = match budget {
         PatchBudget::Size(size) if size > 0.0 => size * size,
         PatchBudget::Size(size) => return Err(PatchError::Size(size)),
@@ -680,13 +725,13 @@ fn divide(triangles: &mut [Triangle], budget: PatchBudget) -> Result<(), PatchEr
             // The number of cells falls with their area: bisection on the logarithm of the area. Where there are more
             // triangles than the wish, large ones are still cut, to cells as large as the mean triangle.
             let wish = wish.max(1) as f64;
-            let total: f64 = triangles.iter().map(|t| t.cell_area * f64::from(sides(t))).sum();
-            let all_sides: f64 = triangles.iter().map(|t| f64::from(sides(t))).sum();
+            let total: f64 = outlines.iter().map(|(o, s)| o.area() * f64::from(*s)).sum();
+            let all_sides: f64 = outlines.iter().map(|(_, s)| f64::from(*s)).sum();
             let (mut small, mut large) = (total / wish * 1e-3, 2.0 * total / wish.max(all_sides));
             let mut best = (f64::INFINITY, large);
             for _ in 0..32 {
                 let middle = (small * large).sqrt();
-                let n = count(middle);
+                let n = count(middle) as f64;
                 if (n - wish).abs() < best.0 {
                     best = ((n - wish).abs(), middle);
                 }
@@ -696,17 +741,10 @@ fn divide(triangles: &mut [Triangle], budget: PatchBudget) -> Result<(), PatchEr
         }
     };
     let total = count(area);
-    if total > f64::from(i32::MAX) {
-        return Err(PatchError::TooMany(total));
+    if total > i32::MAX as u64 {
+        return Err(PatchError::TooMany(total as f64));
     }
-    let mut next = 0;
-    for t in triangles.iter_mut() {
-        t.cells = cut(t, area);
-        t.cell_area /= f64::from(t.cells.count());
-        t.first_patch = next;
-        next += sides(t) * t.cells.count();
-    }
-    Ok(())
+    Ok((area, total))
 }
 
 #[cfg(test)]

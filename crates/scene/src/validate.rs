@@ -48,6 +48,8 @@ impl Scene {
                 fault(element(), "its transform is not finite".into());
             }
         }
+        // Once a picture, however many materials use it.
+        let mut brightest: Vec<Option<Rgb>> = vec![None; self.images.len()];
         for (i, material) in self.materials.iter().enumerate() {
             let element = || format!("material {i} \"{}\"", material.name);
             let (colors, textures): (Vec<Rgb>, Vec<&TextureRef>) = match &material.surface {
@@ -58,8 +60,9 @@ impl Scene {
                     (vec![base_color.factor], all)
                 }
                 Surface::Phong { diffuse, specular, .. } => {
-                    let image = diffuse.texture.as_ref().and_then(|t| self.images.get(t.image));
-                    let brightest = image.map_or(Rgb::WHITE, |i| brightest_texel(i));
+                    let image = diffuse.texture.as_ref().map(|t| t.image).filter(|&i| i < self.images.len());
+                    let brightest = image
+                        .map_or(Rgb::WHITE, |i| *brightest[i].get_or_insert_with(|| brightest_texel(&self.images[i])));
                     (vec![diffuse.factor * brightest + *specular, diffuse.factor, *specular], textures(&[diffuse]))
                 }
             };
@@ -69,8 +72,8 @@ impl Scene {
                     fault(element(), format!("reflectance {:?}, expected 0 to 1", c.to_array()));
                 }
             }
-            if !material.emission.is_finite() || material.emission.min_channel() < 0.0 {
-                fault(element(), format!("emission {:?}, expected 0 or more", material.emission.to_array()));
+            if !is_radiance(material.emission) {
+                fault(element(), format!("emission {:?}, {RADIANCE}", material.emission.to_array()));
             }
             for t in textures.into_iter().chain(&material.emission_texture) {
                 if t.image >= self.images.len() {
@@ -85,12 +88,18 @@ impl Scene {
             }
         }
         if let Some(Environment::Uniform(radiance)) = &self.environment
-            && (!radiance.is_finite() || radiance.min_channel() < 0.0)
+            && !is_radiance(*radiance)
         {
-            fault("environment".into(), format!("radiance {:?}, expected 0 or more", radiance.to_array()));
+            fault("environment".into(), format!("radiance {:?}, {RADIANCE}", radiance.to_array()));
         }
         faults
     }
+}
+
+const RADIANCE: &str = "expected 0 or more, and no more than single precision can hold";
+
+fn is_radiance(radiance: Rgb) -> bool {
+    radiance.min_channel() >= 0.0 && radiance.to_f32().iter().all(|c| c.is_finite())
 }
 
 /// Largest value of each channel: two lobes share a surface's light, and a dark texture leaves room for the other.

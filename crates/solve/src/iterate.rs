@@ -5,7 +5,6 @@
 
 use twinray_scene::PatchScene;
 
-use crate::frozen;
 use crate::glossy::GlossyPatches;
 use crate::observer::Observer;
 use crate::params::{Params, Schedule, SolveError};
@@ -16,7 +15,6 @@ use crate::sequential::Sequential;
 use crate::solution::Solution;
 use crate::stage::Stage;
 use crate::strategies::Shares;
-use crate::wave::close;
 use crate::waves::Surroundings;
 
 /// Rays of the paper's schedule between two looks at the clock.
@@ -244,15 +242,4 @@ fn check(scene: &PatchScene, params: &Params) -> Result<(), SolveError> {
         Schedule::Paper { .. } if sky => Err(SolveError::PaperEnvironment),
         _ => Ok(()),
     }
-}
-
-/// Bytes that a solve of a scene of so many patches, of which some are glossy, keeps for each (default schedule), error
-/// bars and table of the choice included; beside them are the lists of the rays in flight, 33 bytes a ray of a wave.
-pub fn state_bytes(patches: usize, glossy: usize, observed: bool) -> usize {
-    let lobe = close::BYTES_PER_GLOSSY_PATCH
-        + frozen::BYTES_PER_GLOSSY_PATCH
-        + GlossyPatches::BYTES_PER_GLOSSY_PATCH
-        + if observed { close::BYTES_PER_OBSERVED_PATCH + GlossyPatches::BYTES_PER_OBSERVED_PATCH } else { 0 };
-    let number = if glossy > 0 { GlossyPatches::BYTES_PER_PATCH } else { 0 };
-    patches * (close::BYTES_PER_PATCH + frozen::BYTES_PER_PATCH + number) + glossy * lobe
 }

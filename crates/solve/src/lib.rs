@@ -16,6 +16,7 @@
 
 mod direction;
 mod error_bars;
+mod estimate;
 mod fixed;
 mod frozen;
 mod glossy;
@@ -42,7 +43,8 @@ pub mod transfer;
 mod wave;
 mod waves;
 
-pub use iterate::{Solver, state_bytes};
+pub use estimate::{Demand, solving_bytes, state_bytes};
+pub use iterate::Solver;
 pub use merge::merge;
 pub use observer::Observer;
 pub use params::{Estimator, Params, Representation, Schedule, SolveError};

@@ -408,6 +408,13 @@ fn base_radiance(scene: &PatchScene, patch: PatchId, irradiance: Rgb, eye: DVec3
     irradiance * scene.brdf(patch).base_reflectance(scene.normal(patch).dot(eye)) / PI
 }
 
+/// Bytes of the state of the paper's schedule: sums, and a tree of two powers a node.
+pub(crate) fn state_bytes(patches: usize, glossy: usize) -> usize {
+    let tree = 2 * size_of::<[f64; 2]>() * patches.next_power_of_two();
+    let number = if glossy > 0 { GlossyPatches::BYTES_PER_PATCH * patches } else { 0 };
+    size_of::<PatchState>() * patches + size_of::<GlossyState>() * glossy + tree + number
+}
+
 /// H(n) = Σ 1/m for m ≤ n; exact sums up to 128, beyond them the asymptotic series (error below 1e-14).
 fn harmonic(n: u64) -> f64 {
     if n <= 128 {

@@ -166,19 +166,9 @@ impl Waves {
         self.output_weight = 0.0;
     }
 
-    /// Rays of the next wave: a function of n and K alone, so that stopping and resuming change nothing.
-    fn wave_size(&self, patches: usize) -> u64 {
-        let half = (patches as u64 / 2).max(SMALLEST_WAVE);
-        // A representative is one sample per wave, so a glossy scene needs many waves: 2 K rays each do no harm that could
-        // be measured (Phong lobes of exponent 30 and 200, the hall), 8 K make 3 to 5 % more error (`docs/paper.md`).
-        let glossy = !self.source.representatives.is_empty();
-        let (wanted, most) = if glossy { (self.n / 2, 2 * patches as u64) } else { (self.n / 8, LARGEST_WAVE) };
-        wanted.clamp(half, most.min(LARGEST_WAVE).max(half))
-    }
-
     /// One wave.
     pub(crate) fn advance(&mut self, around: Surroundings, output: &mut OutputState, workspace: &mut Workspace) {
-        let size = self.wave_size(around.scene.len());
+        let size = wave_size(self.n, around.scene.len(), !self.source.representatives.is_empty());
         // The one-sided estimators divide by other densities than witnesses tell of.
         let fitted = around.params.shares.is_none() && around.params.estimator == Estimator::Balance;
         let weight = 2.0 * self.output_weight.max(1.0);
@@ -256,10 +246,8 @@ impl Waves {
     /// ends it where less than one ray's worth is left. Counts follow from U alone and deposits are divided by the
     /// count that was planned with certainty, so the sum is unbiased.
     fn warm_start(&mut self, around: Surroundings, output: &mut OutputState, workspace: &mut Workspace) {
-        // A glossy scene's output does not remember the start, so there it is the shorter the better forgotten.
         let glossy = !around.glossy.patches().is_empty();
-        let smallest = if glossy { SMALLEST_WAVE } else { SMALLEST_WARM_START };
-        let planned = ((0.5 * around.params.warm_start * around.scene.len() as f64) as u64).max(smallest);
+        let planned = warm_start_rays(around.params.warm_start, around.scene.len(), glossy);
         let pilot_rays = (planned / 32) as f64;
         // A pilot measures how much light there will be to shoot, and how much of the sky comes in; its result is
         // thrown away, so that the main run's counts do not depend on the main run's numbers.
@@ -378,6 +366,22 @@ impl Waves {
         }
         Shot { total, sky }
     }
+}
+
+/// Rays of the next wave: a function of n and K alone, so that stopping and resuming change nothing.
+pub(crate) fn wave_size(n: u64, patches: usize, glossy: bool) -> u64 {
+    let half = (patches as u64 / 2).max(SMALLEST_WAVE);
+    // A representative is one sample per wave, so a glossy scene needs many waves: 2 K rays each do no harm that could
+    // be measured (Phong lobes of exponent 30 and 200, the hall), 8 K make 3 to 5 % more error (`docs/paper.md`).
+    let (wanted, most) = if glossy { (n / 2, 2 * patches as u64) } else { (n / 8, LARGEST_WAVE) };
+    wanted.clamp(half, most.min(LARGEST_WAVE).max(half))
+}
+
+/// Planned rays of the warm start, whose setting is in rays per patch of both replicas.
+pub(crate) fn warm_start_rays(setting: f64, patches: usize, glossy: bool) -> u64 {
+    // A glossy scene's output does not remember the start, so there it is the shorter the better forgotten.
+    let smallest = if glossy { SMALLEST_WAVE } else { SMALLEST_WARM_START };
+    ((0.5 * setting * patches as f64) as u64).max(smallest)
 }
 
 /// What a ray of the warm start counts for in the output against one of a wave. Shot by power alone, it finds patches in

@@ -9,6 +9,7 @@ use twinray::format::{self, CellTable, Provenance, StoredSolution};
 
 use crate::args::{ExportArgs, SolveArgs};
 use crate::commands;
+use crate::estimate::Work;
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
@@ -23,7 +24,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Ending> {
         bail!("{name}: is no solution; expected a .twin file: `twinray solve {name}` writes one");
     }
     commands::set_threads(args.load.threads);
-    let loaded = input::load(&args.load, None)?;
+    let loaded = input::load(&args.load, None, &Work::default())?;
     let mut output = Output::open(&args.output)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     let Some(stored) = &loaded.stored else { unreachable!("a solution was loaded") };

@@ -6,6 +6,7 @@ use twinray::solve::{Params, Solver, state_bytes};
 
 use crate::args::InfoArgs;
 use crate::commands::{self, solution};
+use crate::estimate::{Rays, Work};
 use crate::failure::Ending;
 use crate::{input, stored};
 
@@ -18,7 +19,8 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
         return solution::describe(&args.load.scene, args.load.json);
     }
     commands::set_threads(args.load.threads);
-    let loaded = input::load(&args.load, None)?;
+    let work = Work { solve: Some((Params::default_preset(1), Rays::Total(PROBE_RAYS))), ..Work::default() };
+    let loaded = input::load(&args.load, None, &work)?;
     let patches = &loaded.patches;
     let closedness = patches.closedness(PROBE_RAYS);
     let mut solver =
@@ -50,6 +52,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
             "bytes": { "rays": kernel, "patches": constants, "solver": state },
             "power": commands::balance_json(&balance),
             "cameras": cameras,
+            "expected": loaded.expected.json(),
             "warnings": warnings,
         });
         println!("{report:#}");

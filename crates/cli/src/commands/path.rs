@@ -100,6 +100,7 @@ pub(super) fn run(
             "relative_error": error,
             "invalid_paths": tracer.invalid(),
             "exposure_ev": factor.log2(),
+            "expected": loaded.expected.json(),
             "warnings": loaded.warnings,
         });
         println!("{report:#}");

@@ -9,6 +9,7 @@ use twinray::format::{self, Method, Provenance, SolutionFile};
 use twinray::render::reference::{PatchTracer, Technique};
 
 use crate::args::ReferenceArgs;
+use crate::estimate::Work;
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
@@ -29,7 +30,7 @@ pub fn run(args: &ReferenceArgs) -> anyhow::Result<Ending> {
     commands::set_threads(args.load.threads);
     interrupt::install();
     let start = Instant::now();
-    let loaded = input::load(&args.load, None)?;
+    let loaded = input::load(&args.load, None, &work(args))?;
     let mut output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
@@ -43,6 +44,13 @@ pub fn run(args: &ReferenceArgs) -> anyhow::Result<Ending> {
     output.put(|out| format::write_solution(&solution, out))?;
     report(args, &loaded, &tracer, &path, &solution.provenance, [loading, tracing], interrupted);
     Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+/// What is to be done, for the estimate.
+fn work(args: &ReferenceArgs) -> Work {
+    let ends_by_paths = args.time.is_none() && args.error.is_none();
+    let paths = ends_by_paths.then(|| u64::from(args.paths.unwrap_or(DEFAULT_PATHS)));
+    Work { trace: Some(paths), writes_solution: true, ..Work::default() }
 }
 
 /// Traces, one path per patch at a time, until the goal is reached; says if it was interrupted, and the seconds.
@@ -121,6 +129,7 @@ fn report(
             "paths_per_second": rate,
             "relative_error": error,
             "invalid_paths": tracer.invalid(),
+            "expected": loaded.expected.json(),
             "warnings": loaded.warnings,
         });
         println!("{report:#}");

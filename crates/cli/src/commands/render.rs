@@ -12,6 +12,7 @@ use twinray::solve::{Observer, Solution};
 
 use crate::args::{ExposureArg, LobesArg, MethodArg, RenderArgs, ToneArg};
 use crate::commands::{path, solving};
+use crate::estimate::{PictureWork, Work};
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
@@ -35,7 +36,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     commands::set_threads(args.load.threads);
     interrupt::install();
     let start = Instant::now();
-    let loaded = input::load(&args.load, Some(&args.view))?;
+    let loaded = input::load(&args.load, Some(&args.view), &work(args))?;
     let overridden = loaded.cameras.first().is_some_and(|c| c.name == "command line");
     let camera = input::pick_camera(&loaded.cameras, args.view.camera.as_deref().filter(|_| !overridden))?;
     let output = Output::open(&path)?;
@@ -94,6 +95,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
             "invalid_deposits": solution.invalid_deposits(),
             "power": commands::balance_json(&balance),
             "exposure_ev": factor.log2(),
+            "expected": loaded.expected.json(),
             "warnings": warnings,
         });
         println!("{report:#}");
@@ -138,13 +140,21 @@ fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<
     Ok(Light { solution, settings, seconds: start.elapsed().as_secs_f64(), rate: 0.0, interrupted: false })
 }
 
+/// What is to be done, for the estimate.
+fn work(args: &RenderArgs) -> Work {
+    let is_traced = args.path.method == MethodArg::Path;
+    let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
+    let solve = if is_traced { Work::default() } else { solving::work(&args.solve, None) };
+    Work { picture: Some(PictureWork { size: args.size, samples, is_traced }), ..solve }
+}
+
 pub(super) fn default_output(scene: &str) -> PathBuf {
     let stem = Path::new(scene).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     PathBuf::from(format!("{stem}.png"))
 }
 
 /// Size of a picture where the user does not say.
-pub(super) fn default_size(camera: &Camera) -> (u32, u32) {
+pub fn default_size(camera: &Camera) -> (u32, u32) {
     let aspect = camera.aspect.filter(|a| (0.05..=20.0).contains(a)).unwrap_or(4.0 / 3.0);
     ((f64::from(DEFAULT_HEIGHT) * aspect).round() as u32, DEFAULT_HEIGHT)
 }

@@ -10,6 +10,7 @@ use twinray::solve::{Peers, Solver};
 
 use crate::args::SolutionArgs;
 use crate::commands::{self, solving};
+use crate::estimate::Work;
 use crate::failure::Ending;
 use crate::input::Loaded;
 use crate::output::{Output, extension};
@@ -28,7 +29,8 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     commands::set_threads(args.load.threads);
     interrupt::install();
     let start = Instant::now();
-    let loaded = input::load(&args.load, None)?;
+    let work = Work { writes_solution: true, ..solving::work(&args.solve, args.part) };
+    let loaded = input::load(&args.load, None, &work)?;
     let settings = settings(args, &loaded)?;
     let output = leads.then(|| Output::open(&path)).transpose()?;
     commands::print_warnings(&loaded.warnings, quiet);
@@ -105,6 +107,7 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
             "relative_error": error,
             "invalid_deposits": solution.invalid_deposits(),
             "power": commands::balance_json(&balance),
+            "expected": loaded.expected.json(),
             "warnings": warnings,
         });
         println!("{report:#}");

@@ -5,6 +5,7 @@ use anyhow::anyhow;
 use twinray::solve::{Observer, Peers, Solver};
 
 use crate::args::SolveArgs;
+use crate::estimate::{Rays, Work};
 use crate::input::Loaded;
 use crate::interrupt;
 use crate::progress::{Goal, Progress};
@@ -73,6 +74,17 @@ pub fn solve<'a>(
     progress.finish();
     let seconds = progress.seconds();
     Ok(Solved { solver, before, seconds, interrupted })
+}
+
+/// What is to be done, for the estimate.
+pub fn work(args: &SolveArgs, part: Option<[u32; 2]>) -> Work {
+    let parts = part.map_or(1, |[_, n]| u64::from(n));
+    let rays = match (args.rays, args.time, args.error) {
+        (Some(n), ..) => Rays::Total(n.div_ceil(parts)),
+        (None, None, None) => Rays::PerPatch(DEFAULT_RAYS_PER_PATCH.div_ceil(parts)),
+        _ => Rays::Unknown,
+    };
+    Work { solve: Some((Settings::new(args, part).params(), rays)), ..Work::default() }
 }
 
 /// How far to go: as the user says, or some rays per patch. A part of several shoots its share of the rays, and leaves its share

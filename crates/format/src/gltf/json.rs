@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::context::Context;
 use crate::error::FormatError;
+use crate::limits::as_name;
 
 /// Parses `text` after asking for the memory that its tree will take.
 pub(super) fn parse(context: &mut Context<'_>, text: &[u8]) -> Result<(Value, u64), FormatError> {
@@ -176,7 +177,8 @@ impl<'a> Element<'a> {
 
     /// Its name, or `fallback`.
     pub(super) fn name_or(&self, fallback: impl FnOnce() -> String) -> String {
-        self.value.get("name").and_then(Value::as_str).filter(|n| !n.is_empty()).map_or_else(fallback, str::to_owned)
+        let name = self.value.get("name").and_then(Value::as_str).filter(|n| !n.is_empty());
+        name.map_or_else(fallback, |name| as_name(name).to_owned())
     }
 
     /// True if this value is a JSON object.

@@ -125,7 +125,7 @@ impl Reader<'_, '_> {
         let strength = element.extension("KHR_materials_emissive_strength");
         let strength = strength.map_or(1.0, |e| self.number(&e, "emissiveStrength", 1.0, 0.0..=f64::MAX));
         let emissive = self.colour(element, "emissiveFactor", [0.0; 3], f64::MAX);
-        let emission = Rgb::from_array(emissive) * strength;
+        let emission = self.emission(element, Rgb::from_array(emissive) * strength);
         // The texture of a black emitter would be decoded for nothing.
         let emission_texture = if emission.is_black() { None } else { self.texture(element.get("emissiveTexture")) };
         let transmissive = self.transmits(element);
@@ -133,6 +133,16 @@ impl Reader<'_, '_> {
         let opacity = self.opacity(element, &name);
         let two_sided = element.flag("doubleSided");
         Material { name, surface, emission, emission_texture, two_sided, opacity, transmissive }
+    }
+
+    /// `emission` within the limits; a factor times a strength may also be no number at all.
+    fn emission(&mut self, element: &Element<'_>, emission: Rgb) -> Rgb {
+        let most = self.context.limits.max_radiance;
+        let kept = emission.map(|c| if c <= most { c } else { most });
+        if kept != emission {
+            self.context.warn(&element.path, format!("emission {:?} is brought down to {most:e}", emission.to_array()));
+        }
+        kept
     }
 
     fn ior(&mut self, element: &Element<'_>) -> f64 {

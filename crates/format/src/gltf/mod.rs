@@ -40,6 +40,9 @@ const UNDERSTOOD: [&str; 8] = [
     "KHR_texture_transform",
 ];
 
+/// Memory of a mesh beside its arrays and its name.
+const MESH_BYTES: u64 = 2 * size_of::<Mesh>() as u64;
+
 /// Reads a `.glb` or `.gltf` file.
 pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, FormatError> {
     let (text, chunk) = container::split(context.file, bytes)?;
@@ -128,6 +131,7 @@ impl Content<'_, '_> {
         let mut meshes = Vec::new();
         for (i, primitive) in mesh.items("primitives")?.enumerate() {
             let name = if count > 1 { format!("{base}#{i}") } else { base.clone() };
+            context.charge(MESH_BYTES + name.len() as u64, &primitive.path)?;
             let Some(read) = self.primitives.read(context, root, &primitive, &name)? else { continue };
             let material = self.materials.of(context, root, self.buffers, &primitive)?;
             self.scene.meshes.push(Mesh { material, ..read });
@@ -200,7 +204,7 @@ fn read_extras(context: &Context<'_>, root: &Element<'_>, scene: &mut Scene) {
     let extras = root.get("asset").and_then(|asset| asset.get("extras")?.get("twinray"));
     let Some(extras) = extras else { return };
     if let Ok(Some(radiance)) = extras.numbers::<3>("environment")
-        && radiance.iter().all(|c| *c >= 0.0)
+        && radiance.iter().all(|c| (0.0..=context.limits.max_radiance).contains(c))
     {
         scene.environment = Some(Environment::Uniform(Rgb::from_array(radiance)));
     }

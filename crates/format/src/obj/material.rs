@@ -112,6 +112,12 @@ impl Materials {
         if emission.is_black() && emission_texture.is_some() {
             emission = Rgb::WHITE;
         }
+        let most = context.limits.max_radiance;
+        if emission.max_channel() > most {
+            let element = format!("material \"{}\"", entry.name);
+            context.warn(element, format!("emission {:?} is brought down to {most:e}", emission.to_array()));
+            emission = emission.map(|c| c.min(most));
+        }
         let opacity = entry.opacity.unwrap_or(1.0);
         let transmissive = opacity < 1.0;
         if transmissive {

@@ -11,6 +11,7 @@ mod polygon;
 mod write;
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 use glam::DAffine3;
 use twinray_scene::{Instance, Mesh, Scene};
@@ -21,6 +22,7 @@ use self::polygon::Triangulator;
 use crate::context::Context;
 use crate::error::FormatError;
 use crate::geometry::no_triangles;
+use crate::limits::as_name;
 
 pub use self::write::{ObjFiles, write_obj};
 
@@ -72,14 +74,13 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
 /// Materials of all libraries that can be had; what cannot is a warning.
 fn read_libraries(context: &mut Context<'_>, libraries: &[(String, usize)]) -> Result<Vec<mtl::Entry>, FormatError> {
     let mut entries = Vec::new();
-    let mut seen: Vec<String> = Vec::new();
+    let mut seen = HashSet::new();
     for (names, line) in libraries {
         for name in library_names(names) {
             // A file that names hundreds of libraries is not a scene.
-            if seen.contains(&name) || seen.len() >= 256 {
+            if seen.len() >= 256 || !seen.insert(name.clone()) {
                 continue;
             }
-            seen.push(name.clone());
             match context.fetch(&format!("line {line}: mtllib"), &name) {
                 Ok(bytes) => entries.extend(mtl::parse(context, &name, &bytes)?),
                 Err(error) => {
@@ -120,17 +121,50 @@ fn text<'b>(file: &str, bytes: &'b [u8], what: &str) -> Result<Cow<'b, str>, For
     if bytes.iter().take(4096).any(|&b| b == 0) {
         return Err(unreadable("the bytes are not text"));
     }
-    let mut text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let mut bytes = Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     // Old Macs end lines with a carriage return alone; that of Windows is trimmed with the line.
-    if !text.contains('\n') && text.contains('\r') {
-        text = Cow::Owned(text.replace('\r', "\n"));
+    if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
+        bytes.to_mut().iter_mut().filter(|b| **b == b'\r').for_each(|b| *b = b'\n');
     }
-    for continued in ["\\\n", "\\\r\n"] {
-        if text.contains(continued) {
-            text = Cow::Owned(text.replace(continued, " \x0c"));
+    // Before foreign bytes become three each: there is one copy of that at most.
+    Ok(match join_lines(bytes) {
+        Cow::Borrowed(bytes) => String::from_utf8_lossy(bytes),
+        Cow::Owned(bytes) => Cow::Owned(match String::from_utf8_lossy(&bytes) {
+            Cow::Owned(text) => text,
+            Cow::Borrowed(_) => String::from_utf8(bytes).unwrap_or_default(),
+        }),
+    })
+}
+
+/// Puts a space and a form feed where a backslash ends a line.
+fn join_lines(bytes: Cow<'_, [u8]>) -> Cow<'_, [u8]> {
+    let end = |at: usize| match &bytes[at..] {
+        [b'\\', b'\n', ..] => 2,
+        [b'\\', b'\r', b'\n', ..] => 3,
+        _ => 0,
+    };
+    if (0..bytes.len()).all(|at| end(at) == 0) {
+        return bytes;
+    }
+    let (mut joined, mut at) = (Vec::with_capacity(bytes.len()), 0);
+    while at < bytes.len() {
+        match end(at) {
+            0 => {
+                joined.push(bytes[at]);
+                at += 1;
+            }
+            length => {
+                joined.extend(b" \x0c");
+                at += length;
+            }
         }
     }
-    Ok(text)
+    joined.into()
+}
+
+/// Memory of a text that could not stay where it was.
+fn copied_bytes(text: &Cow<'_, str>) -> u64 {
+    if let Cow::Owned(text) = text { text.capacity() as u64 } else { 0 }
 }
 
 /// The lines of `text` that say something: no comments, no empty ones.
@@ -158,6 +192,11 @@ impl Line<'_> {
             })?;
         }
         Ok(numbers)
+    }
+
+    /// What follows the keyword as a name.
+    fn name(&self) -> &str {
+        as_name(self.rest)
     }
 
     fn invalid(&self, file: &str, found: String, expected: &str) -> FormatError {

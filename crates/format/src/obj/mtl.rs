@@ -36,10 +36,12 @@ pub(super) struct Map {
 pub(super) fn parse(context: &mut Context<'_>, file: &str, bytes: &[u8]) -> Result<Vec<Entry>, FormatError> {
     let mut entries: Vec<Entry> = Vec::new();
     let text = super::text(file, bytes, "an MTL file")?;
+    let copied = super::copied_bytes(&text);
+    context.charge(copied, "text")?;
     for line in super::lines(&text) {
         if line.keyword.eq_ignore_ascii_case("newmtl") {
             context.charge(size_of::<Entry>() as u64 * 2 + line.rest.len() as u64, "materials")?;
-            entries.push(Entry { name: line.rest.to_owned(), ..Entry::default() });
+            entries.push(Entry { name: line.name().to_owned(), ..Entry::default() });
             continue;
         }
         // Values before the first name belong to nothing.
@@ -48,6 +50,8 @@ pub(super) fn parse(context: &mut Context<'_>, file: &str, bytes: &[u8]) -> Resu
             context.warnings.push(file, format!("line {}", line.number), format!("{message}: ignored"));
         }
     }
+    drop(text);
+    context.budget.release(copied);
     Ok(entries)
 }
 

@@ -66,10 +66,14 @@ struct State {
 pub(super) fn parse(context: &mut Context<'_>, bytes: &[u8]) -> Result<Document, FormatError> {
     let mut state = State::default();
     let text = super::text(context.file, bytes, "an OBJ file")?;
+    let copied = super::copied_bytes(&text);
+    context.charge(copied, "text")?;
     state.reserve(context, &text)?;
     for line in super::lines(&text) {
         state.line(context, &line)?;
     }
+    drop(text);
+    context.budget.release(copied);
     let State { document, ahead, small_faces, colours, .. } = state;
     if let Some((index, line)) = ahead.filter(|(index, _)| *index as usize >= document.positions.len()) {
         let expected = format!("a number from 1 to {}, the count of vertices", document.positions.len());
@@ -130,15 +134,15 @@ impl State {
             }
             "f" | "fo" => self.face(context, line)?,
             "o" => {
-                self.object = line.rest.to_owned();
+                self.object = line.name().to_owned();
                 self.current = None;
             }
             "g" => {
-                self.group = line.rest.to_owned();
+                self.group = line.name().to_owned();
                 self.current = None;
             }
             "usemtl" => {
-                self.material = Some(line.rest.to_owned()).filter(|m| !m.is_empty());
+                self.material = Some(line.name().to_owned()).filter(|m| !m.is_empty());
                 self.current = None;
             }
             "mtllib" => {
@@ -201,7 +205,8 @@ impl State {
         let index = match self.by_name.get(&key) {
             Some(&index) => index,
             None => {
-                context.charge(1024 + 4 * (key.0.len() as u64), "groups")?;
+                let names = key.0.len() + key.1.as_ref().map_or(0, String::len);
+                context.charge(1024 + 4 * names as u64, "groups")?;
                 let name = if key.0.is_empty() { "object".to_owned() } else { key.0.clone() };
                 groups.push(Group { name, material: key.1.clone(), corners: Vec::new(), sizes: Vec::new() });
                 self.by_name.insert(key, groups.len() - 1);

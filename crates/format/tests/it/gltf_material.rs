@@ -200,3 +200,18 @@ fn values_out_of_range_or_of_another_type_are_replaced() {
         assert_warns(&reading, &["materials[0] \"paint\"", key, value]);
     }
 }
+
+/// A patch keeps its emission in single precision, and sums of its square.
+#[test]
+fn emission_beyond_all_bounds_is_brought_down() {
+    let mut doc = Doc::square();
+    let material = &mut doc.json["materials"][0];
+    material["emissiveFactor"] = json!([7e77, 1.0, 0.5]);
+    material["extensions"] = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": 1e9 } });
+    let reading = doc.read().unwrap();
+    assert_eq!(reading.scene.materials[0].emission, Rgb::new(1e12, 1e9, 5e8));
+    assert_warns(&reading, &["paint", "emission", "brought down to 1e12"]);
+    doc.json["materials"][0]["emissiveFactor"] = json!([1e300, 1.0, 0.0]);
+    doc.json["materials"][0]["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = json!(1e300);
+    assert_eq!(doc.scene().materials[0].emission, Rgb::new(1e12, 1e12, 0.0));
+}

@@ -97,3 +97,26 @@ proptest! {
         }
     }
 }
+
+/// A block of an EXR picture is unpacked with all of its channels: few pixels may ask for much.
+#[test]
+fn pictures_of_very_many_channels_are_refused() {
+    let bytes = write_exr(64, 64, &[[0.5; 3]; 64 * 64], None, &[]);
+    let limits = Limits { max_image_texels: 64 * 64, ..Limits::default() };
+    assert!(read_picture("a.picture", &bytes, &limits).is_ok());
+    // The list of channels: a name, a type and sixteen bytes of each. Five hundred more, of 32 bits.
+    let at = bytes.windows(8).position(|w| w == b"chlist\0\x37").expect("the list of three channels");
+    let (size_at, list_at) = (at + 7, at + 11);
+    let entry = |name: &str| [name.as_bytes(), b"\0", &[2, 0, 0, 0], &[0; 4], &[1, 0, 0, 0], &[1, 0, 0, 0]].concat();
+    let more: Vec<u8> = (0..500).flat_map(|i| entry(&format!("Z{i:03}"))).collect();
+    let size = u32::from_le_bytes(bytes[size_at..size_at + 4].try_into().unwrap());
+    let (head, rest) = (&bytes[..size_at], &bytes[list_at..]);
+    let (list, rest) = rest.split_at(size as usize - 1);
+    let grown = [head, &(size + more.len() as u32).to_le_bytes(), list, &more, rest].concat();
+    match read_picture("a.picture", &grown, &limits) {
+        Err(FormatError::OverLimit { limit: "max_image_texels", needed, .. }) => {
+            assert!(needed.contains("channels"), "{needed}");
+        }
+        other => panic!("expected a refusal, got {:?}", other.map(|p| p.image.width)),
+    }
+}

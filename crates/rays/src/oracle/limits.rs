@@ -1,6 +1,6 @@
 //! The ends of the range: depth, coincident triangles, bad numbers, threads, instruction sets.
 
-use super::{Random, check, soup};
+use super::{Random, check, count, soup};
 use crate::Bvh;
 use crate::build::{Tree, build};
 use crate::lanes::{Lanes, Portable};
@@ -10,10 +10,10 @@ use crate::traverse::MAX_DEPTH;
 
 #[test]
 fn a_hundred_thousand_coincident_triangles() {
-    let mut triangles = vec![[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]; 100_000];
-    triangles.extend(soup(100, 1.0, &mut Random(5)));
+    let mut triangles = vec![[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]; count(100_000, 30)];
+    triangles.extend(soup(count(100, 10), 1.0, &mut Random(5)));
     let mut random = Random(6);
-    let rays: Vec<Ray> = (0..50).map(|_| Ray::new([0.3, 0.3, 2.0], random.point())).collect();
+    let rays: Vec<Ray> = (0..count(50, 5)).map(|_| Ray::new([0.3, 0.3, 2.0], random.point())).collect();
     check(&triangles, rays);
     let hit = Bvh::build(&triangles).closest_hit(&Ray::new([0.3, 0.3, 1e-3], [0.0, 0.0, -1.0])).unwrap();
     assert_eq!((hit.triangle, hit.front), (0, true));
@@ -31,7 +31,7 @@ fn depth(tree: &Tree, node: usize) -> usize {
 fn skewed_input_keeps_the_depth_bounded() {
     // Sizes in geometric progression, many of each: area alone would peel them off a few at a time.
     let mut triangles = Vec::new();
-    for step in 0..6000 {
+    for step in 0..count(6000, 60) {
         let x = 2f32.powf(60.0 - step as f32 / 40.0);
         triangles.push([[x, 0.0, 0.0], [0.0, x, 0.0], [0.0, 0.0, x]]);
     }
@@ -67,7 +67,7 @@ fn rays_of_any_bits_end() {
     let triangles = soup(300, 0.3, &mut random);
     let any = |random: &mut Random| f32::from_bits(random.bits() as u32);
     let special = [0.0, -0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, 1e-19, 1.0, 1e19, f32::MAX];
-    for round in 0..20_000 {
+    for round in 0..count(20_000, 6) {
         let mut number = || {
             if round % 2 == 0 { any(&mut random) } else { random.pick(&special) }
         };
@@ -79,7 +79,7 @@ fn rays_of_any_bits_end() {
 
 #[test]
 fn the_build_does_not_depend_on_threads() {
-    let triangles = soup(30_000, 0.02, &mut Random(8));
+    let triangles = soup(count(30_000, 60), 0.02, &mut Random(8));
     let build_on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| build(&triangles))
@@ -116,7 +116,7 @@ fn lanes_agree_to_the_bit() {
 fn agrees_with_portable<L: Lanes>() {
     let mut random = Random(9);
     let numbers = [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 1e-30, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
-    for round in 0..50_000 {
+    for round in 0..count(50_000, 100) {
         let mut number = || {
             if round % 3 == 0 { random.pick(&numbers) } else { random.signed() }
         };
