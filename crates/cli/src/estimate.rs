@@ -14,6 +14,8 @@ use crate::memory;
 
 /// Bytes of a solution file for each patch.
 const FILE_BYTES_PER_PATCH: usize = 62;
+/// Bytes that writing a solution takes for each patch beside the solver: its error bars and the light.
+const WRITING_BYTES_PER_PATCH: usize = 33;
 /// Bytes that a patch tracer keeps for each patch, and then the light that it gives.
 const TRACER_BYTES_PER_PATCH: usize = 40 + 25;
 /// Bytes that looking at a solution takes for each patch, the solution included, and for each that is seen.
@@ -38,6 +40,8 @@ pub struct Work {
     pub picture: Option<PictureWork>,
     /// Whether a solution file is written.
     pub writes_solution: bool,
+    /// Whether another process speaks for this one.
+    pub is_silent: bool,
 }
 
 /// A picture to be made.
@@ -80,7 +84,8 @@ impl Expected {
     pub fn line(&self, name: &str) -> String {
         let mut line = format!("{name}: expecting {} patches, {} of memory", self.cut.patches, size(self.memory));
         if let Some(rays) = self.rays {
-            line += &format!(", {:.4} M rays", rays as f64 * 1e-6);
+            let millions = rays as f64 * 1e-6;
+            line += &if rays < 1_000_000 { format!(", {rays} rays") } else { format!(", {millions:.1} M rays") };
         }
         if let Some(bytes) = self.file {
             line += &format!(", a file of {}", size(bytes));
@@ -119,8 +124,8 @@ pub fn expect(args: &LoadArgs, scene: &Scene, options: PatchOptions, work: &Work
 }
 
 /// Says what is to be expected; a warning if that is more than there is.
-pub fn announce(args: &LoadArgs, expected: &Expected) -> Option<String> {
-    if !args.quiet {
+pub fn announce(args: &LoadArgs, expected: &Expected, work: &Work) -> Option<String> {
+    if !args.quiet && !work.is_silent {
         eprintln!("{}", expected.line(&args.scene));
     }
     // Who allows some memory knows better how much there is.
@@ -154,7 +159,8 @@ fn with(cut: &Estimate, [now, most_so_far]: [u64; 2], work: &Work, pixels: usize
         };
         let (glossy, observed) = (cut.glossy_patches, work.picture.is_some());
         let demand = Demand { patches, glossy, observed, reflectance: cut.reflectance, rays };
-        after = solving_bytes(params, &demand);
+        after =
+            solving_bytes(params, &demand) + if work.writes_solution { WRITING_BYTES_PER_PATCH * patches } else { 0 };
     }
     if let Some(paths) = work.trace {
         rays = paths.map(|n| n.saturating_mul(patches as u64));

@@ -150,7 +150,7 @@ fn cut(
     };
     let options = PatchOptions { budget, two_sided: source.two_sided };
     let expected = estimate::expect(args, &scene, options, work)?;
-    warnings.extend(estimate::announce(args, &expected));
+    warnings.extend(estimate::announce(args, &expected, work));
     let lamp_at = wanted.as_ref().filter(|_| decides);
     for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
         warnings.push(format!("{name}: {addition}"));

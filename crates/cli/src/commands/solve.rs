@@ -29,7 +29,7 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     commands::set_threads(args.load.threads);
     interrupt::install();
     let start = Instant::now();
-    let work = Work { writes_solution: true, ..solving::work(&args.solve, args.part) };
+    let work = Work { writes_solution: true, is_silent: !leads, ..solving::work(&args.solve, args.part) };
     let loaded = input::load(&args.load, None, &work)?;
     let settings = settings(args, &loaded)?;
     let output = leads.then(|| Output::open(&path)).transpose()?;
