@@ -163,6 +163,7 @@ fn join_lines(bytes: Cow<'_, [u8]>) -> Cow<'_, [u8]> {
 }
 
 /// Memory of a text that could not stay where it was.
+#[allow(clippy::ptr_arg, reason = "whether it is owned is the question")]
 fn copied_bytes(text: &Cow<'_, str>) -> u64 {
     if let Cow::Owned(text) = text { text.capacity() as u64 } else { 0 }
 }
