@@ -12,10 +12,13 @@ use crate::args::LoadArgs;
 use crate::commands::render::default_size;
 use crate::memory;
 
-/// Bytes of a solution file for each patch.
-const FILE_BYTES_PER_PATCH: usize = 62;
-/// Bytes that writing a solution takes for each patch beside the solver: its error bars and the light.
-const WRITING_BYTES_PER_PATCH: usize = 33;
+/// Bytes of a solution file for each patch, for each glossy one beside that, and for each patch of a reference.
+const FILE_BYTES_PER_PATCH: usize = 73;
+const FILE_BYTES_PER_GLOSSY_PATCH: usize = 48;
+const REFERENCE_BYTES_PER_PATCH: usize = 29;
+/// Bytes that writing a solution takes for each patch beside the solver: what has another form in the file, error bars and
+/// the light.
+const WRITING_BYTES_PER_PATCH: usize = 66;
 /// Bytes that a patch tracer keeps for each patch, and then the light that it gives.
 const TRACER_BYTES_PER_PATCH: usize = 40 + 25;
 /// Bytes that looking at a solution takes for each patch, the solution included, and for each that is seen.
@@ -99,9 +102,13 @@ impl Expected {
     }
 }
 
-/// Bytes of a solution file of so many patches.
-pub fn solution_file_bytes(patches: usize) -> u64 {
-    (FILE_BYTES_PER_PATCH * patches) as u64 + 2000
+/// Bytes of a solution file.
+fn solution_file_bytes(cut: &Estimate, is_reference: bool) -> u64 {
+    let bytes = match is_reference {
+        true => REFERENCE_BYTES_PER_PATCH * cut.patches,
+        false => FILE_BYTES_PER_PATCH * cut.patches + FILE_BYTES_PER_GLOSSY_PATCH * cut.glossy_patches,
+    };
+    bytes as u64 + 2000
 }
 
 /// What `work` on `scene` will take.
@@ -166,7 +173,7 @@ fn with(cut: &Estimate, [now, most_so_far]: [u64; 2], work: &Work, pixels: usize
         rays = paths.map(|n| n.saturating_mul(patches as u64));
         after = TRACER_BYTES_PER_PATCH * patches;
     }
-    let file = work.writes_solution.then(|| solution_file_bytes(patches));
+    let file = work.writes_solution.then(|| solution_file_bytes(cut, work.trace.is_some()));
     if let Some(picture) = work.picture {
         // What is not seen has neighbours that are.
         let seen = patches.min(pixels.saturating_mul(picture.samples as usize) * 3 / 4);
