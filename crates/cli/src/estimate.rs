@@ -16,9 +16,9 @@ use crate::memory;
 const FILE_BYTES_PER_PATCH: usize = 73;
 const FILE_BYTES_PER_GLOSSY_PATCH: usize = 48;
 const REFERENCE_BYTES_PER_PATCH: usize = 29;
-/// Bytes that writing a solution takes for each patch beside the solver: what has another form in the file, error bars and
-/// the light.
-const WRITING_BYTES_PER_PATCH: usize = 66;
+/// Bytes that writing a solution takes for each patch beside the solver and beyond what a snapshot takes, which is made
+/// after it: what has another form in the file, error bars and the light.
+const WRITING_BYTES_PER_PATCH: usize = 46;
 /// Bytes that a patch tracer keeps for each patch, and then the light that it gives.
 const TRACER_BYTES_PER_PATCH: usize = 40 + 25;
 /// Bytes that looking at a solution takes for each patch, the solution included, and for each that is seen.

@@ -66,7 +66,8 @@ impl FixedRgb {
     #[inline]
     pub fn add(&mut self, value: Rgb, unit: Unit) {
         for (channel, v) in self.0.iter_mut().zip(value.to_array()) {
-            *channel += unit.quantize(v);
+            // The unit leaves room for every deposit of a solve; numbers that somebody else wrote may go round.
+            *channel = channel.wrapping_add(unit.quantize(v));
         }
     }
 

@@ -87,7 +87,8 @@ impl BucketSums {
                     // Squares span twice the orders of magnitude that deposits do, so they are rounded at random.
                     let [a, b] = deposit.bits();
                     let square = power.luminance() * power.luminance();
-                    sums.squares += units.square.quantize_dithered(square, to_unit(mix(a ^ b.rotate_left(32))));
+                    let square = units.square.quantize_dithered(square, to_unit(mix(a ^ b.rotate_left(32))));
+                    sums.squares = sums.squares.wrapping_add(square);
                     sums.hits += 1;
                 }
                 if let Some(number) = context.glossy.number_of(deposit.patch()) {
@@ -128,7 +129,7 @@ impl GlossySums {
             _ => (power * brdf.lobe_albedo(cosine)).luminance(),
         };
         if importance > 0.0 && cosine > 0.0 {
-            self.importance += unit.quantize(importance);
+            self.importance = self.importance.wrapping_add(unit.quantize(importance));
             // A number from the deposit's own bits: the same whoever shot it, in whatever order.
             let [a, b] = deposit.bits();
             let uniform = to_unit(mix(mix(closing.seed ^ a) ^ mix(b ^ u64::from(from) << 32)));
