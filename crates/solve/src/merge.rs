@@ -45,7 +45,7 @@ pub fn merge(parts: &[(u64, &WavesRecord)]) -> Result<WavesRecord<'static>, Reco
     let hits = |k: usize| parts.iter().fold(0, |hits: u32, (_, part)| hits.saturating_add(part.hits[k]));
     let colors = |k: usize| std::array::from_fn(|c| sum(&|part| part.reflected[k][c].into()) as f32);
     Ok(WavesRecord {
-        rays: parts.iter().map(|(_, part)| part.rays).sum(),
+        rays: parts.iter().fold(0, |rays: u64, (_, part)| rays.saturating_add(part.rays)),
         weight,
         tally,
         deposits: patches().map(|k| std::array::from_fn(|c| sum(&|part| part.deposits[k][c]))).collect(),

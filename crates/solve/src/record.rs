@@ -267,7 +267,7 @@ impl<'a> WavesRecord<'a> {
         let (patches, glossy) = (self.deposits.len(), self.glossy.len());
         number("rays", self.rays <= MOST_RAYS, "at most 2^56")?;
         number("weight", self.weight > 0.0 && self.weight.is_finite(), "a positive number")?;
-        number("tally", is_finite(&self.tally), FINITE)?;
+        number("tally", is_sound(&self.tally), FINITE)?;
         length("squares", self.squares.len(), patches)?;
         length("difference", self.difference.len(), patches)?;
         length("hits", self.hits.len(), patches)?;
@@ -298,8 +298,8 @@ impl<'a> WavesRecord<'a> {
 impl SequentialRecord<'_> {
     fn check(&self) -> Result<(), RecordError> {
         let patches = self.irradiance.len();
-        number("rays", self.rays <= MOST_RAYS, "at most 2^56")?;
-        number("tally", is_finite(&self.tally), FINITE)?;
+        number("rays", self.rays <= MOST_RAYS && self.updates <= MOST_RAYS, "at most 2^56")?;
+        number("tally", is_sound(&self.tally), FINITE)?;
         length("squares", self.squares.len(), patches)?;
         length("hits", self.hits.len(), patches)?;
         length("tree", self.tree.len(), 2 * patches.next_power_of_two())?;
@@ -327,8 +327,10 @@ impl SequentialRecord<'_> {
 const FINITE: &str = "finite numbers";
 const POSITIVE: &str = "finite numbers of at least 0";
 
-fn is_finite(tally: &Tally) -> bool {
-    tally.to_words()[2..].iter().all(|w| f64::from_bits(*w).is_finite())
+/// False of what no solve gives.
+pub(crate) fn is_sound(tally: &Tally) -> bool {
+    let sums = tally.to_words()[2..].iter().all(|w| f64::from_bits(*w).is_finite());
+    sums && tally.rays <= MOST_RAYS && tally.invalid <= MOST_RAYS
 }
 
 fn number(array: &'static str, good: bool, expected: &'static str) -> Result<(), RecordError> {

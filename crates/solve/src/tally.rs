@@ -49,8 +49,8 @@ impl Tally {
 
     /// Adds `other` with a weight for its sums.
     pub fn add_weighted(&mut self, other: &Tally, weight: f64) {
-        self.rays += other.rays;
-        self.invalid += other.invalid;
+        self.rays = self.rays.saturating_add(other.rays);
+        self.invalid = self.invalid.saturating_add(other.invalid);
         self.arrived += other.arrived * weight;
         self.absorbed += other.absorbed * weight;
         self.escaped += other.escaped * weight;

@@ -127,7 +127,7 @@ fn merge(parts: &[Part], folder: &Path) -> anyhow::Result<SolutionFile<'static>>
     let (file, source) = sources.swap_remove(0);
     let provenance = Provenance {
         source: format::SceneSource { file, ..source },
-        rays: provenances().map(|p| p.rays).sum(),
+        rays: provenances().fold(0, |rays: u64, p| rays.saturating_add(p.rays)),
         seed: provenances().map(|p| p.seed).min().unwrap_or_default(),
         part: None,
         seeds,

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::{Surroundings, Waves};
-use crate::record::{MOST_RAYS, RUN_WORDS, RecordError, RunRecord, Words};
+use crate::record::{MOST_RAYS, RUN_WORDS, RecordError, RunRecord, Words, is_sound};
 use crate::source::PackedRepresentative;
 use crate::strategies::{Fit, Known, STRATEGIES, Shares};
 use crate::tally::Tally;
@@ -29,7 +29,7 @@ impl Waves {
         let sum: f64 = shares.iter().sum();
         let positive = [this.source_weight, this.output_weight, this.known.energy, this.known.irradiance];
         let fits = this.fit.sums.iter().flatten().chain([&this.fit.witnesses]);
-        let weights = positive.iter().all(|x| x.is_finite()) && this.wave <= MOST_RAYS;
+        let weights = positive.iter().all(|x| x.is_finite()) && this.wave <= MOST_RAYS && is_sound(&this.tally);
         let positive = positive.iter().chain(fits).chain(&shares).all(|x| *x >= 0.0);
         if !(weights && positive && (sum - 1.0).abs() < 1e-6) {
             let expected = "weights of at least 0, and shares that are 1 together";
