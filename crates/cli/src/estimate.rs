@@ -43,7 +43,7 @@ pub struct Work {
     pub picture: Option<PictureWork>,
     /// Whether a solution file is written.
     pub writes_solution: bool,
-    /// Whether another process speaks for this one.
+    /// Whether another process speaks for this one, or the command itself says what there is.
     pub is_silent: bool,
 }
 

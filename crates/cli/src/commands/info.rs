@@ -19,7 +19,8 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
         return solution::describe(&args.load.scene, args.load.json);
     }
     commands::set_threads(args.load.threads);
-    let work = Work { solve: Some((Params::default_preset(1), Rays::Total(PROBE_RAYS))), ..Work::default() };
+    let solve = Some((Params::default_preset(1), Rays::Total(PROBE_RAYS)));
+    let work = Work { solve, is_silent: true, ..Work::default() };
     let loaded = input::load(&args.load, None, &work)?;
     let patches = &loaded.patches;
     let closedness = patches.closedness(PROBE_RAYS);
