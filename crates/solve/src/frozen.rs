@@ -208,7 +208,9 @@ impl<'a> Frozen<'a> {
             0.0
         };
         let patches = c.patches * source.gather();
-        [density - lamps - c.area - patches, lamps, c.area, patches, 0.0]
+        // What is left of a density without power is a rounding, of either sign.
+        let power = if c.per_power > 0.0 { (density - lamps - c.area - patches).max(0.0) } else { 0.0 };
+        [power, lamps, c.area, patches, 0.0]
     }
 
     /// Probability with which a patch is chosen, but for the rounding of all of them.

@@ -1,6 +1,6 @@
 //! A solve written down and taken up again goes on as if nothing had been; several added up are as good as they say.
 
-use twinray_scene::{PatchScene, Rgb, Scene, builtin};
+use twinray_scene::{PatchScene, Rgb, Scene, Surface, Texel, builtin};
 use twinray_solve::record::WavesRecord;
 use twinray_solve::{Params, PatchLight, Record, RecordError, Representation, Schedule, SolveError, Solver, merge};
 
@@ -93,6 +93,28 @@ fn a_resumed_solve_is_the_unbroken_one() {
         let light = a.patch_light(&scene);
         let (told, error) = unbroken.record().light(light.area.clone(), light.emits.clone());
         assert_eq!((told, error), (light, a.relative_error()), "{name}");
+    }
+}
+
+/// Where nothing is reflected no ray is chosen by power, and no rounding may say that it helped or hurt: a share of less than
+/// nothing could not be gone on from.
+#[test]
+fn a_black_scene_under_a_sky_goes_on() {
+    let mut authored = sky(builtin::plates(1.0));
+    for material in &mut authored.materials {
+        material.emission = Rgb::BLACK;
+        material.surface = Surface::Lambertian { reflectance: Texel::constant(Rgb::BLACK) };
+    }
+    let scene = cut(&authored, 500);
+    for seed in 1..=3 {
+        let params = Params::default_preset(seed);
+        let mut solver = Solver::new(&scene, params.clone(), None).unwrap();
+        solver.run(100_000);
+        let mut resumed = Solver::resume(&scene, params, &copied(&solver.record())).unwrap();
+        for solver in [&mut solver, &mut resumed] {
+            solver.run(200_000);
+        }
+        assert_eq!(solver.record(), resumed.record(), "seed {seed}");
     }
 }
 
