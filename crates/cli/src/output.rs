@@ -1,7 +1,7 @@
 //! Files are written beside their place and renamed: nobody ever meets half of one, whatever happens to the program.
 //!
 //! The file beside has a fixed name, so that a killed program leaves at most one, which the next run takes over; it is
-//! locked, so that two programs never write to one place.
+//! locked from the start to the end, so that two programs never write to one place.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
@@ -20,7 +20,7 @@ pub struct Output {
     name: String,
     path: PathBuf,
     beside: PathBuf,
-    /// Locked; `None` after a checkpoint, until the next.
+    /// Locked; `None` only if it could not be opened anew after a checkpoint.
     file: Option<File>,
 }
 
@@ -62,14 +62,17 @@ impl Output {
             buffered.flush()
         });
         let written = written.and_then(|()| file.sync_all());
-        let written = written.and_then(|()| readable(&file));
         if let Err(error) = written {
             // Half a file helps nobody, and its room may be needed.
             let _ = file.set_len(0);
             self.file = Some(file);
             return Err(error).context(format!("{name}: writing failed; what was there before is untouched"));
         }
-        std::fs::rename(&self.beside, &self.path).with_context(|| format!("{name}: cannot be replaced"))?;
+        std::fs::rename(&self.beside, &self.path).with_context(|| {
+            format!("{name}: cannot be replaced; what was to replace it is {}", self.beside.display())
+        })?;
+        // The place stays taken between checkpoints, or a second program would come in and shut this one out at its end.
+        self.file = open_beside(name, &self.beside).ok();
         // The new name itself must outlive a loss of power. Not every system lets a folder be opened for it.
         if let Ok(folder) = File::open(folder_of(&self.path)) {
             let _ = folder.sync_all();
@@ -96,30 +99,38 @@ pub fn abandon() {
 
 fn open_beside(name: &str, beside: &Path) -> anyhow::Result<File> {
     let folder = folder_of(Path::new(name));
-    let file = OpenOptions::new().write(true).create(true).truncate(false).open(beside);
-    let file = file.with_context(|| format!("{name}: cannot write into the folder {}", folder.display()))?;
-    match file.try_lock() {
-        Err(TryLockError::WouldBlock) => {
-            bail!("{name}: another twinray is writing it; expected a name of its own for every run")
+    for _ in 0..100 {
+        let file = OpenOptions::new().write(true).create(true).truncate(false).open(beside);
+        let file = file.with_context(|| format!("{name}: cannot write into the folder {}", folder.display()))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => break,
+            // Where nothing can be locked, nothing protects from a second program, and one alone needs nothing.
+            Err(TryLockError::Error(_)) => return Ok(file),
+            // Between the opening and the lock its owner may have put it in its place: then it is no longer beside.
+            Ok(()) if is_at(&file, beside) => return Ok(file),
+            Ok(()) => {}
         }
-        // Where nothing can be locked, nothing protects from a second program, and one alone needs nothing.
-        Err(TryLockError::Error(_)) | Ok(()) => Ok(file),
+    }
+    bail!("{name}: another twinray is writing it; expected a name of its own for every run")
+}
+
+/// True if the open file is the one that has this name now.
+fn is_at(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let there = std::fs::metadata(path).and_then(|there| Ok((there, file.metadata()?)));
+        there.is_ok_and(|(a, b)| (a.dev(), a.ino()) == (b.dev(), b.ino()))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (file, path);
+        true
     }
 }
 
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// A result is as readable as the user's other files, whoever made the file that it replaces.
-fn readable(file: &File) -> io::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    let _ = file;
-    Ok(())
 }
 
 /// The extension in lower case.

@@ -198,6 +198,39 @@ fn a_file_that_is_being_written_is_let_alone() {
     assert_eq!(place.files(), ["x.twin"]);
 }
 
+/// Who may read a result is the user's to say (`umask`), and not every file system lets it be said.
+#[cfg(unix)]
+#[test]
+fn results_are_as_private_as_the_user_wants() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Place::new();
+    for (umask, mode) in [("077", 0o600), ("022", 0o644)] {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "umask $0; exec \"$@\"", umask]).arg(assert_cmd::cargo::cargo_bin!("twinray"));
+        shell.args(["scene", "cube", "-o", &format!("{umask}.glb")]).current_dir(place.path(""));
+        assert!(shell.status().unwrap().success());
+        let permissions = place.path(&format!("{umask}.glb")).metadata().unwrap().permissions();
+        assert_eq!(permissions.mode() & 0o777, mode);
+    }
+}
+
+/// Nor do they after checkpoints: whoever came first stays the only one to its end.
+#[test]
+fn a_file_with_checkpoints_is_let_alone() {
+    let place = Place::new();
+    let args = ["solve", "cornell", "-o", "x.twin", "--patches", "300", "--time", "600", "--checkpoint", "0.3s"];
+    let mut child = command(&place, &args).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    for _ in 0..3 {
+        assert!(lines.any(|line| line.starts_with("kept ")), "no checkpoint");
+        let run = place.run(&["solve", "cornell", "-o", "x.twin", "--rays", "1k", "--seed", "2"]);
+        assert!(run.stderr.contains("x.twin: another twinray is writing it"), "{}", run.stderr);
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(place.done(&["info", "x.twin"]).stdout.contains("seed 1"));
+}
+
 fn command(place: &Place, args: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin!("twinray"));
     command.args(args).current_dir(place.path("")).stderr(Stdio::piped());
