@@ -154,9 +154,12 @@ pub struct SolveArgs {
     #[arg(long, value_enum)]
     pub representation: Option<RepresentationArg>,
     /// Rays per iteration of the paper preset [default: 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=LARGEST_BATCH))]
     pub batch: Option<u64>,
 }
+
+/// A batch is shot before anybody looks at signals, and its deposits are kept meanwhile: 2 GB of them.
+pub const LARGEST_BATCH: u64 = 1 << 24;
 
 /// Presets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

@@ -133,7 +133,7 @@ pub fn expect(args: &LoadArgs, scene: &Scene, options: PatchOptions, work: &Work
 /// Says what is to be expected; a warning if that is more than there is.
 pub fn announce(args: &LoadArgs, expected: &Expected, work: &Work) -> Option<String> {
     if !args.quiet && !work.is_silent {
-        eprintln!("{}", expected.line(&args.scene));
+        crate::say!("{}", expected.line(&args.scene));
     }
     // Who allows some memory knows better how much there is.
     let shortage = shortage(expected).filter(|_| args.read.max_memory.is_none())?;

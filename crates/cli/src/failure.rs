@@ -20,7 +20,7 @@ pub fn exit_code(outcome: anyhow::Result<Ending>) -> u8 {
         Ok(Ending::Exceeded) => 1,
         Ok(Ending::Interrupted) => interrupt::code(),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            crate::say!("error: {error:#}");
             2
         }
     }

@@ -97,17 +97,17 @@ pub fn load(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow::Re
         patch_size: args.patch_size,
         two_sided: args.two_sided,
     };
-    cut(args, source, view, true, work)
+    cut(args, source, view, None, work)
 }
 
 /// The scene of a solution file, cut as it was for it.
 fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow::Result<Loaded> {
     let name = args.scene.as_str();
     let stored = Stored::open(name)?;
-    let (mut source, fingerprint, scene) = {
+    let (mut source, fingerprint, scene, patches) = {
         let file = stored.read()?;
         let p = file.provenance();
-        (p.source.clone(), p.fingerprint, p.scene.clone())
+        (p.source.clone(), p.fingerprint, p.scene.clone(), file.patches())
     };
     let differs = [
         ("--patches", args.patches.is_some_and(|n| Some(n) != source.patches)),
@@ -120,7 +120,7 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow:
     }
     source.file = stored::scene_of(name, &source, args.scene_file.as_deref())?;
     let file = source.file.clone();
-    let loaded = cut(args, source, view, false, work)?;
+    let loaded = cut(args, source, view, Some(patches), work)?;
     let found = loaded.patches.fingerprint();
     if found != fingerprint {
         bail!(
@@ -130,13 +130,13 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow:
     Ok(Loaded { stored: Some(stored), ..loaded })
 }
 
-/// Reads a scene, completes it and cuts it. A wanted camera may be lit by a lamp of its own, where there is no light, if it
-/// `decides`.
+/// Reads a scene, completes it and cuts it. A wanted camera may be lit by a lamp of its own, where there is no light, unless
+/// the patches are `known`: then there are about so many.
 fn cut(
     args: &LoadArgs,
     source: SceneSource,
     view: Option<&ViewArgs>,
-    decides: bool,
+    known: Option<usize>,
     work: &Work,
 ) -> anyhow::Result<Loaded> {
     let (mut scene, mut warnings) = read(&source.file, &args.read)?;
@@ -150,8 +150,16 @@ fn cut(
     };
     let options = PatchOptions { budget, two_sided: source.two_sided };
     let expected = estimate::expect(args, &scene, options, work)?;
+    // Whatever a file says of how its scene was cut, it must not cost more than the file itself did. Completing adds few.
+    if let Some(known) = known.filter(|known| expected.cut.patches / 2 > known + 1000) {
+        bail!(
+            "{}: has {known} patches, and its scene is cut into {}: one of them has changed",
+            args.scene,
+            expected.cut.patches
+        );
+    }
     warnings.extend(estimate::announce(args, &expected, work));
-    let lamp_at = wanted.as_ref().filter(|_| decides);
+    let lamp_at = wanted.as_ref().filter(|_| known.is_none());
     for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
         warnings.push(format!("{name}: {addition}"));
     }

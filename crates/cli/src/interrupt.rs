@@ -13,7 +13,8 @@ const SAID: &str =
 pub fn install() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     // A second installation would do no harm; there is none. Without signals there is nothing to listen to.
-    let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]) else { return };
+    let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|&signal| !is_ignored(signal));
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(wanted) else { return };
     std::thread::spawn(move || {
         for signal in signals.forever() {
             if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
@@ -21,9 +22,17 @@ pub fn install() {
                 crate::output::abandon();
                 std::process::exit(exit_code(signal).into());
             }
-            eprintln!("{SAID}");
+            crate::say!("{SAID}");
         }
     });
+}
+
+/// Whether whoever started this program wants a signal ignored, as `nohup` does; Linux tells.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 /// Installs the handlers, where there are but flags.
@@ -46,7 +55,7 @@ pub fn install() {
                     crate::output::abandon();
                     std::process::exit(exit_code(SIGINT).into());
                 }
-                eprintln!("{SAID}");
+                crate::say!("{SAID}");
             }
         }
     });

@@ -2,6 +2,15 @@
 //!
 //! A library, so that the crate `twinray-mpi` can be the same command with other processes beside it.
 
+/// A line to standard error, if anybody still listens: a pipe or terminal that was closed must not cost the work.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+pub(crate) use say;
+
 mod args;
 mod commands;
 mod estimate;

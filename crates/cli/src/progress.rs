@@ -109,7 +109,7 @@ impl Progress {
         );
         match &self.shown {
             Shown::Nothing => {}
-            Shown::Lines => eprintln!("{:3.0} %  {message}", 100.0 * share.min(1.0)),
+            Shown::Lines => crate::say!("{:3.0} %  {message}", 100.0 * share.min(1.0)),
             Shown::Bar(bar) => {
                 bar.set_position((1000.0 * share.min(1.0)) as u64);
                 bar.set_message(message);
@@ -121,7 +121,7 @@ impl Progress {
     /// Says something in between: in a line of its own where there are lines.
     pub fn say(&self, text: &str) {
         match &self.shown {
-            Shown::Lines => eprintln!("{text}"),
+            Shown::Lines => crate::say!("{text}"),
             Shown::Nothing | Shown::Bar(_) => {}
         }
     }

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use twinray::format::Provenance;
 use twinray::solve::{Estimator, Params, Representation, Schedule};
 
-use crate::args::{EstimatorArg, Preset, RepresentationArg, SolveArgs};
+use crate::args::{EstimatorArg, LARGEST_BATCH, Preset, RepresentationArg, SolveArgs};
 
 /// What decides a solution beside scene and rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,14 +43,14 @@ impl Settings {
                 anyhow!("{name}: its setting {key} is \"{word}\", which this twinray does not know: use the one that wrote it")
             })
         }
-        let batch = word("batch").map_or(Ok(1), |word| word.parse());
+        let batch = word("batch").map_or(Some(1), |word| word.parse().ok().filter(|n| (1..=LARGEST_BATCH).contains(n)));
         let stored = Self {
             seed: provenance.seed,
             part: provenance.part,
             preset: value(name, "preset", word("preset"))?,
             estimator: value(name, "estimator", word("estimator"))?,
             representation: value(name, "representation", word("representation"))?,
-            batch: batch.map_err(|_| anyhow!("{name}: its setting batch is no number"))?,
+            batch: batch.ok_or_else(|| anyhow!("{name}: its setting batch is no number from 1 to {LARGEST_BATCH}"))?,
         };
         let wish = [
             ("--seed", args.seed.is_some_and(|seed| seed != stored.seed)),

@@ -85,7 +85,8 @@ pub fn scene_of(name: &str, source: &SceneSource, wish: Option<&str>) -> anyhow:
     let link = Path::new(name).parent().unwrap_or(Path::new(""));
     let folder = if Path::new(name).is_symlink() { real.parent().unwrap_or(link) } else { link };
     let path = folder.join(&source.file);
-    if !path.exists() {
+    // A pipe would be waited for, a device may have no end: no file may send us there.
+    if !path.is_file() {
         bail!(
             "{name}: its scene was {}, seen from its folder, and is not there; --scene-file FILE says where it is now",
             source.file

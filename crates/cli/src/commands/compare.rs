@@ -29,7 +29,7 @@ pub fn verdict(args: &CompareArgs, measure: &str, value: f64, is_within: bool) -
     }
     if !args.quiet {
         let shown = if limit.percent { format!("{:.4}%", 100.0 * value) } else { format!("{value:.6}") };
-        eprintln!("{}: {measure} is {shown}, beyond the {} that --max-error allows", args.test, limit.text());
+        crate::say!("{}: {measure} is {shown}, beyond the {} that --max-error allows", args.test, limit.text());
     }
     Ending::Exceeded
 }

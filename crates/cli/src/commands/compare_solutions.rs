@@ -29,7 +29,10 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Ending> {
     }
     let (a, b) = (&test.provenance, &reference.provenance);
     if a.seeds.iter().any(|seed| b.seeds.contains(seed)) && a.method == b.method && !args.quiet {
-        eprintln!("warning: both have the seed {}: their errors are not independent, and z-scores say little", a.seed);
+        crate::say!(
+            "warning: both have the seed {}: their errors are not independent, and z-scores say little",
+            a.seed
+        );
     }
     let difference = compare::solutions(&test.light, &reference.light);
     if args.json {

@@ -63,7 +63,7 @@ fn table<'a>(name: &str, loaded: &'a Loaded, file: &StoredSolution) -> anyhow::R
 fn report(args: &ExportArgs, loaded: &Loaded, p: &Provenance) {
     let (output, patches) = (args.output.display().to_string(), loaded.patches.len());
     if !args.load.quiet {
-        eprintln!(
+        crate::say!(
             "{output}: {patches} patches of {}, {} rays, estimated error {:.2} %, fingerprint {:016x}",
             p.scene,
             p.rays,

@@ -142,8 +142,8 @@ fn report(args: &MergeArgs, parts: &[Part], merged: &SolutionFile) {
     let p = &merged.provenance;
     let missing = missing_parts(parts);
     if !args.quiet {
-        missing.iter().for_each(|m| eprintln!("note: {m}"));
-        eprintln!(
+        missing.iter().for_each(|m| crate::say!("note: {m}"));
+        crate::say!(
             "{}: {} files, {} solves, {} rays, estimated error {:.2} %, fingerprint {:016x}",
             args.output.display(),
             parts.len(),

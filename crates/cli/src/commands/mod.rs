@@ -27,7 +27,7 @@ fn set_threads(threads: Option<u16>) {
 
 fn print_warnings(warnings: &[String], quiet: bool) {
     if !quiet {
-        warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+        warnings.iter().for_each(|w| crate::say!("warning: {w}"));
     }
 }
 

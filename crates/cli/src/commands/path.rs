@@ -80,7 +80,7 @@ pub(super) fn run(
     let rate = paths as f64 / tracing.max(1e-9);
     let error = tracer.relative_error();
     if !args.load.quiet {
-        eprintln!(
+        crate::say!(
             "{}: {} paths per pixel in {tracing:.1} s ({:.2} M/s), estimated error of a pixel {:.2} %, seed {seed}; exposure {:+.2} EV",
             path.display(),
             tracer.samples(),

@@ -34,7 +34,7 @@ pub fn run(args: &ReferenceArgs) -> anyhow::Result<Ending> {
     let mut output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
-        eprintln!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
+        crate::say!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
     }
     let loading = start.elapsed().as_secs_f64();
 
@@ -110,7 +110,7 @@ fn report(
     let fingerprint = format!("{:016x}", provenance.fingerprint);
     let rate = paths as f64 / tracing.max(1e-9);
     if !args.load.quiet {
-        eprintln!(
+        crate::say!(
             "{}: {} paths per patch in {tracing:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}, fingerprint {fingerprint}",
             path.display(),
             tracer.paths_per_patch(),

@@ -42,7 +42,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
-        eprintln!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
+        crate::say!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
     }
     let loading = start.elapsed().as_secs_f64();
 
@@ -71,8 +71,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     commands::print_warnings(loss.as_slice(), args.load.quiet);
     warnings.extend(loss);
     if !args.load.quiet {
-        eprintln!("{}", commands::balance_line(&balance));
-        eprintln!(
+        crate::say!("{}", commands::balance_line(&balance));
+        crate::say!(
             "{}: {} rays {}in {seconds:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
             path.display(),
             solution.rays(),

@@ -21,7 +21,7 @@ pub fn run(args: &SceneArgs) -> anyhow::Result<Ending> {
     };
     let Some(path) = &args.output else { bail!("where to? expected -o FILE.glb or -o FILE.obj") };
     let (mut scene, warnings) = input::read_any(name, &args.read)?;
-    warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    warnings.iter().for_each(|w| crate::say!("warning: {w}"));
     match extension(path).as_str() {
         "glb" => Output::open(path)?.write(&format::write_glb(&scene))?,
         "obj" => {

@@ -35,7 +35,7 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     let output = leads.then(|| Output::open(&path)).transpose()?;
     commands::print_warnings(&loaded.warnings, quiet);
     if !quiet {
-        eprintln!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
+        crate::say!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
     }
     let loading = start.elapsed().as_secs_f64();
 
@@ -75,15 +75,16 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     warnings.extend(loss);
     let fingerprint = format!("{:016x}", keeper.provenance.fingerprint);
     if !quiet {
-        eprintln!("{}", commands::balance_line(&balance));
+        crate::say!("{}", commands::balance_line(&balance));
         if idle && !solved.interrupted {
-            eprintln!(
+            crate::say!(
                 "{}: had {} rays already and is as good as asked for; --rays, --time or --error says how far to go on",
-                args.load.scene, solved.before
+                args.load.scene,
+                solved.before
             );
         }
         let resumed = if solved.before > 0 { format!(", {} before", solved.before) } else { String::new() };
-        eprintln!(
+        crate::say!(
             "{}: {} rays{resumed} in {:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}{}, fingerprint {fingerprint}",
             path.display(),
             solver.rays(),

@@ -51,6 +51,25 @@ fn sigterm_writes_the_solution() {
     assert!(kept.provenance.rays >= kept.light.len() as u64 && kept.record.unwrap().can_go_on());
 }
 
+/// What whoever started the program wants ignored stays ignored: `nohup` lets a solve outlive its terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn nohup_is_heeded() {
+    let place = Place::new();
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' HUP; exec \"$@\"", "sh"]).arg(assert_cmd::cargo::cargo_bin!("twinray"));
+    shell.args(["solve", "cornell", "-o", "kept.twin", "--patches", "300", "--time", "600"]);
+    let mut child = shell.current_dir(place.path("")).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains('%')), "no progress");
+    send(child.id(), "-HUP");
+    // The next line of progress comes two seconds later.
+    assert!(lines.next().unwrap().contains('%'));
+    send(child.id(), "-TERM");
+    lines.for_each(drop);
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+}
+
 /// The second Ctrl-C does not wait for anything, and leaves what was there, and nothing else.
 #[test]
 fn a_second_ctrl_c_stops_at_once() {

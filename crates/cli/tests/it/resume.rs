@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use twinray::format::{Limits, StoredSolution};
+use twinray::format::{Limits, SolutionFile, StoredSolution, read_solution, write_solution};
 
 use crate::support::{FLOOR, Place};
 
@@ -140,6 +140,33 @@ fn damaged_files_are_named() {
     }
 }
 
+/// A file that is whole may still be written to do harm: to cut a scene into billions, to read what has no end, to wait for ever.
+#[test]
+fn hostile_headers_cost_nothing() {
+    let place = Place::new();
+    for (name, preset) in [("default.twin", "default"), ("paper.twin", "paper")] {
+        place.done(&[&["solve", "cornell", "-o", name, "--rays", "20k", "--preset", preset][..], &CUT].concat());
+    }
+    let hostile = |name: &str, change: &dyn Fn(&mut SolutionFile)| {
+        let bytes = place.read(name);
+        let mut file = read_solution(name, &bytes, &Limits::default()).unwrap();
+        change(&mut file);
+        let mut changed = Vec::new();
+        write_solution(&file, &mut changed).unwrap();
+        place.write("bad.twin", changed);
+    };
+    let goes_on = ["solve", "bad.twin", "--rays", "1M"];
+    hostile("default.twin", &|file| file.provenance.source.patches = Some(2_000_000_000));
+    refused(&place, &goes_on, &["bad.twin", "patches", "one of them has changed"]);
+    hostile("default.twin", &|file| file.provenance.source.file = "/dev/zero".into());
+    refused(&place, &goes_on, &["bad.twin", "/dev/zero", "--scene-file"]);
+    hostile("paper.twin", &|file| {
+        let batch = file.provenance.settings.iter_mut().find(|(key, _)| key == "batch").unwrap();
+        batch.1 = u64::MAX.to_string();
+    });
+    refused(&place, &goes_on, &["bad.twin", "batch"]);
+}
+
 /// A disk that is full, or a limit on the size of files, costs a checkpoint or the end, never the file that is there.
 #[test]
 #[cfg(unix)]
@@ -235,6 +262,19 @@ fn command(place: &Place, args: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin!("twinray"));
     command.args(args).current_dir(place.path("")).stderr(Stdio::piped());
     command
+}
+
+/// A log that nobody reads any more, as after `| head -1`, is no reason to lose a solve.
+#[test]
+fn a_reader_that_goes_away_costs_nothing() {
+    let place = Place::new();
+    let mut child =
+        command(&place, &["solve", "cornell", "-o", "x.twin", "--patches", "300", "--time", "3"]).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.next().unwrap().unwrap().contains("patches"));
+    drop(lines);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(rays(&place, "x.twin") > 0);
 }
 
 /// Killed without warning a hundred times, at any moment: the file is always whole, never behind what was said to be kept, and
