@@ -269,6 +269,9 @@ pub struct SolutionArgs {
     /// How often to write what there is, such as 60s, 10m, 2h or never: what a crash can cost
     #[arg(long, value_name = "INTERVAL", default_value = "60s", value_parser = interval)]
     pub checkpoint: Interval,
+    /// Begin anew where the file to write holds the light of this scene already
+    #[arg(long)]
+    pub overwrite: bool,
     /// Solve one of N parts, with random numbers and a share of the rays of its own, for `merge` to add up
     #[arg(long, value_name = "K/N", value_parser = part)]
     pub part: Option<[u32; 2]>,

@@ -2,14 +2,21 @@
 //!
 //! A library, so that the crate `twinray-mpi` can be the same command with other processes beside it.
 
-/// A line to standard error, if anybody still listens: a pipe or terminal that was closed must not cost the work.
+/// A line to standard error, if anybody still listens: a pipe or terminal that was closed must not cost the work. What
+/// files say goes through it, so nothing in it commands a terminal.
 macro_rules! say {
     ($($text:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), $($text)*);
+        let _ = writeln!(std::io::stderr(), "{}", crate::plain(&format!($($text)*)));
     }};
 }
 pub(crate) use say;
+
+/// A text whose control characters, but for ends of lines, are shown instead of obeyed.
+fn plain(text: &str) -> String {
+    let shown = |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(shown).collect()
+}
 
 mod args;
 mod commands;

@@ -30,6 +30,10 @@ impl Output {
         if path.is_dir() {
             bail!("{}: is a folder; expected the name of a file to write", path.display());
         }
+        // Pipes and devices cannot be replaced by a file.
+        if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+            bail!("{}: is no file; expected the name of a file to write", path.display());
+        }
         let folder = folder_of(path);
         if !folder.is_dir() {
             bail!("{}: there is no folder {}; expected one that exists", path.display(), folder.display());
@@ -42,6 +46,11 @@ impl Output {
         let file = open_beside(&name, &beside)?;
         BESIDE.lock().unwrap_or_else(|e| e.into_inner()).push(beside.clone());
         Ok(Self { name, path, beside, file: Some(file) })
+    }
+
+    /// As the user named it.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
     /// Writes all of the file and puts it in its place.

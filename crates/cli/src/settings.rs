@@ -7,6 +7,9 @@ use twinray::solve::{Estimator, Params, Representation, Schedule};
 
 use crate::args::{EstimatorArg, LARGEST_BATCH, Preset, RepresentationArg, SolveArgs};
 
+/// Names of the settings in files.
+const WORDS: [&str; 4] = ["preset", "estimator", "representation", "batch"];
+
 /// What decides a solution beside scene and rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -36,6 +39,9 @@ impl Settings {
 
     /// As a solution file says, which the command line may repeat but not contradict.
     pub fn stored(name: &str, provenance: &Provenance, args: &SolveArgs) -> anyhow::Result<Self> {
+        if let Some((key, _)) = provenance.settings.iter().find(|(key, _)| !WORDS.contains(&key.as_str())) {
+            bail!("{name}: has a setting {key}, which this twinray does not know: use the one that wrote it");
+        }
         let word = |key: &str| provenance.settings.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str());
         fn value<T: ValueEnum + Default>(name: &str, key: &str, word: Option<&str>) -> anyhow::Result<T> {
             let Some(word) = word else { return Ok(T::default()) };
@@ -52,6 +58,9 @@ impl Settings {
             representation: value(name, "representation", word("representation"))?,
             batch: batch.ok_or_else(|| anyhow!("{name}: its setting batch is no number from 1 to {LARGEST_BATCH}"))?,
         };
+        if provenance.seeds.len() == 1 && provenance.seeds[0] != stored.effective_seed() {
+            bail!("{name}: its random numbers are not those of its seed: use the twinray that wrote it");
+        }
         let wish = [
             ("--seed", args.seed.is_some_and(|seed| seed != stored.seed)),
             ("--preset", args.preset.is_some_and(|preset| preset != stored.preset)),

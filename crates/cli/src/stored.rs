@@ -42,6 +42,11 @@ impl Stored {
         Ok(Self { name: name.to_owned(), bytes })
     }
 
+    /// As the user named it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     fn bytes(&self) -> &[u8] {
         self.bytes.as_deref().unwrap_or_default()
     }

@@ -137,6 +137,14 @@ mod tests {
         }
     }
 
+    /// Deposits of states that no solve gives may be beyond every bound: their sums go round, and nothing ends.
+    #[test]
+    fn what_is_beyond_the_bound_goes_round() {
+        let unit = Unit::new(1.0, 4);
+        assert!(sum([1e300; 3].into_iter(), unit).g.is_finite());
+        assert_eq!(sum([1e300, -1e300, 1e300].into_iter(), unit), sum([1e300, 1e300, -1e300].into_iter(), unit));
+    }
+
     #[test]
     fn the_largest_wave_does_not_overflow() {
         let unit = Unit::new(1.0, 1 << 22);

@@ -14,7 +14,7 @@ use crate::tally::Tally;
 const STREAM_MERGE: u64 = 8;
 
 /// Adds up solves of the default schedule by their seeds, which must differ; records that were added up before are
-/// welcome. The sums are taken in the order of seeds, so the order of `parts` changes no bit.
+/// welcome, by a number that no seed of theirs is (or what was chosen at random then would be chosen again). The sums are taken in the order of seeds, so the order of `parts` changes no bit.
 ///
 /// # Errors
 /// If a record holds what no solve gives, or arrays differ in length.
@@ -27,6 +27,10 @@ pub fn merge(parts: &[(u64, &WavesRecord)]) -> Result<WavesRecord<'static>, Reco
     let (_, first) = parts[0];
     for (_, part) in &parts {
         part.check()?;
+        if part.unit != first.unit {
+            let expected = "the same unit in all: that of the scene";
+            return Err(RecordError::Value { array: "totals", index: Some(1), expected });
+        }
         for (array, found, expected) in
             [("deposits", part.deposits.len(), first.deposits.len()), ("glossy", part.glossy.len(), first.glossy.len())]
         {
@@ -48,6 +52,7 @@ pub fn merge(parts: &[(u64, &WavesRecord)]) -> Result<WavesRecord<'static>, Reco
         rays: parts.iter().fold(0, |rays: u64, (_, part)| rays.saturating_add(part.rays)),
         weight,
         tally,
+        unit: first.unit,
         deposits: patches().map(|k| std::array::from_fn(|c| sum(&|part| part.deposits[k][c]))).collect(),
         squares: patches().map(|k| sum(&|part| part.squares[k].into()) as f32).collect(),
         difference: patches().map(difference).collect(),

@@ -38,8 +38,12 @@ impl PatchLight {
             parts.iter().map(|part| f64::from(part.hits[k]) * of(part)).sum::<f64>() / samples(k)
         };
         let error = |k: usize| {
+            let known = || parts.iter().filter(|part| part.hits[k] > 0);
             let squares = |part: &&PatchLight| (f64::from(part.hits[k]) * f64::from(part.standard_error[k])).powi(2);
-            parts.iter().map(squares).sum::<f64>().sqrt() / samples(k)
+            match known().count() {
+                0 => f64::INFINITY,
+                _ => known().map(squares).sum::<f64>().sqrt() / samples(k),
+            }
         };
         let patches = || 0..first.len();
         Self {

@@ -39,11 +39,13 @@ pub struct WavesRecord<'a> {
     pub weight: f64,
     /// Where the light went, sums of that weight, W.
     pub tally: Tally,
+    /// Unit of `difference`, W, and root of that of `squares`: a power of two near the power of the scene.
+    pub unit: f64,
     /// `[K]`: Σ deposits, R, G, B, W. Divided by weight and area they are irradiance.
     pub deposits: Cow<'a, [[f64; 3]]>,
-    /// `[K]`: Σ 𝓛(deposit)², W².
+    /// `[K]`: Σ 𝓛(deposit)², in units squared.
     pub squares: Cow<'a, [f32]>,
-    /// `[K]`: Σ 𝓛(deposit) of the first replica minus that of the second, W; of solves that were added up the root of the sum
+    /// `[K]`: Σ 𝓛(deposit) of the first replica minus that of the second, in units; of solves that were added up the root of the sum
     /// of squares of theirs.
     pub difference: Cow<'a, [f32]>,
     /// `[K]`: number of deposits.
@@ -244,6 +246,7 @@ impl<'a> WavesRecord<'a> {
             rays: self.rays,
             weight: self.weight,
             tally: self.tally,
+            unit: self.unit,
             deposits: &self.deposits,
             evidence: PatchEvidences::Apart(&self.squares, &self.difference, &self.hits),
             reflected: &self.reflected,
@@ -267,6 +270,11 @@ impl<'a> WavesRecord<'a> {
         let (patches, glossy) = (self.deposits.len(), self.glossy.len());
         number("rays", self.rays <= MOST_RAYS, "at most 2^56")?;
         number("weight", self.weight > 0.0 && self.weight.is_finite(), "a positive number")?;
+        number("unit", self.unit > 1e-150 && self.unit < 1e150, "a positive number")?;
+        if let Some([first, second]) = &self.runs {
+            let sum = first.words[0].saturating_add(second.words[0]);
+            number("rays", self.rays == sum, "those of both replicas together")?;
+        }
         number("tally", is_sound(&self.tally), FINITE)?;
         length("squares", self.squares.len(), patches)?;
         length("difference", self.difference.len(), patches)?;

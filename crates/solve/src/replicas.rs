@@ -32,7 +32,7 @@ pub(crate) struct Replicas {
 impl Replicas {
     pub(crate) fn new(around: Surroundings) -> Self {
         let mut workspace = Workspace::default();
-        let mut output = OutputState::new(around.scene.len(), around.glossy);
+        let mut output = OutputState::new(around.scene, around.glossy);
         let runs = [0, 1].map(|k| {
             let (seed, sign) = Self::replica(around, k);
             Waves::new(around, seed, sign, &mut output, &mut workspace)
@@ -48,7 +48,11 @@ impl Replicas {
             Waves::resume(around, seed, sign, record, representatives)
         };
         let runs = [run(0, first, &record.representatives)?, run(1, second, &second.representatives)?];
-        let mut output = OutputState::new(around.scene.len(), around.glossy);
+        let mut output = OutputState::new(around.scene, around.glossy);
+        if output.unit != record.unit {
+            let expected = "the power of two below the power of the scene, W";
+            return Err(RecordError::Value { array: "totals", index: Some(1), expected });
+        }
         output.deposits.copy_from_slice(&record.deposits);
         let evidence = record.sums().evidence;
         (output.evidence.iter_mut().zip(around.scene.patches())).for_each(|(e, p)| *e = evidence.of(p));
@@ -70,6 +74,7 @@ impl Replicas {
             rays: sums.rays,
             weight: sums.weight,
             tally: sums.tally,
+            unit: sums.unit,
             deposits: Cow::Borrowed(sums.deposits),
             squares: self.output.evidence.iter().map(|e| e.squares).collect(),
             difference: self.output.evidence.iter().map(|e| e.difference).collect(),
@@ -119,6 +124,7 @@ impl Replicas {
             rays: self.rays(),
             weight: self.runs.iter().map(Waves::weight).sum(),
             tally,
+            unit: self.output.unit,
             deposits: &self.output.deposits,
             evidence: PatchEvidences::Together(&self.output.evidence),
             reflected: &self.output.reflected,

@@ -20,6 +20,8 @@ pub(crate) struct Sums<'a> {
     /// Weight of the sums: rays, but for what was forgotten.
     pub weight: f64,
     pub tally: Tally,
+    /// W: of differences; squares are in its square.
+    pub unit: f64,
     /// Σ deposits, W.
     pub deposits: &'a [[f64; 3]],
     pub evidence: PatchEvidences<'a>,
@@ -72,9 +74,12 @@ impl<'a> Sums<'a> {
                 area,
                 emits,
                 irradiance: self.irradiance(p, area).luminance(),
-                evidence: Evidence { squares: f64::from(evidence.squares), hits: evidence.hits },
+                evidence: Evidence {
+                    squares: f64::from(evidence.squares) * self.unit * self.unit,
+                    hits: evidence.hits,
+                },
                 // Both replicas have half of the weight.
-                half_difference: Some(f64::from(evidence.difference) / (self.weight * area)),
+                half_difference: Some(f64::from(evidence.difference) * self.unit / (self.weight * area)),
             }
         };
         Noise { rays: self.weight, patches: self.deposits.len(), of }

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{anyhow, bail};
 use serde_json::json;
 use twinray::format::{self, Method, Provenance, SolutionFile};
+use twinray::scene::sample::stream::mix;
 use twinray::solve::{self, PatchLight, Record};
 
 use crate::args::MergeArgs;
@@ -24,11 +25,25 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<Ending> {
     parts.sort_by(|a, b| a.file.provenance.seeds.cmp(&b.file.provenance.seeds));
     check(&parts)?;
     let mut output = Output::open(&args.output)?;
+    spare(args, &parts)?;
     let folder = args.output.parent().unwrap_or(Path::new(""));
     let merged = merge(&parts, folder)?;
     output.put(|out| format::write_solution(&merged, out))?;
     report(args, &parts, &merged);
     Ok(Ending::Done)
+}
+
+/// Refuses to replace what can be gone on with by what cannot.
+fn spare(args: &MergeArgs, parts: &[Part]) -> anyhow::Result<()> {
+    let name = args.output.display().to_string();
+    let Some(there) = args.output.is_file().then(|| Stored::open(&name).ok()).flatten() else { return Ok(()) };
+    let Ok(file) = there.read() else { return Ok(()) };
+    if file.can_go_on() && file.provenance().fingerprint == parts[0].file.provenance.fingerprint {
+        bail!(
+            "{name}: holds a solve of this scene that can be gone on with, and a merge cannot: expected another name"
+        );
+    }
+    Ok(())
 }
 
 /// One of the files.
@@ -99,7 +114,7 @@ fn merge(parts: &[Part], folder: &Path) -> anyhow::Result<SolutionFile<'static>>
     let (light, record, error) = match first.record {
         Some(_) => {
             let records = parts.iter().filter_map(|part| match &part.file.record {
-                Some(Record::Waves(waves)) => Some((part.file.provenance.seeds[0], waves)),
+                Some(Record::Waves(waves)) => Some((identity(&part.file.provenance.seeds), waves)),
                 _ => None,
             });
             let record = Record::Waves(solve::merge(&records.collect::<Vec<_>>()).map_err(|e| anyhow!("{e}"))?);
@@ -136,6 +151,14 @@ fn merge(parts: &[Part], folder: &Path) -> anyhow::Result<SolutionFile<'static>>
         ..first.provenance.clone()
     };
     Ok(SolutionFile { provenance, light, record })
+}
+
+/// One number for the solves of a file: its seed, or of several a mixture of theirs, which is nobody's seed.
+fn identity(seeds: &[u64]) -> u64 {
+    match seeds {
+        [seed] => *seed,
+        _ => seeds.iter().fold(0, |mixed, seed| mix(mixed ^ seed)),
+    }
 }
 
 fn report(args: &MergeArgs, parts: &[Part], merged: &SolutionFile) {

@@ -120,7 +120,8 @@ fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<
         let settings = Settings::new(&args.solve, None);
         let goal = solving::goal(&args.solve, loaded.patches.len(), None);
         let observer = Observer::new(&loaded.patches, camera);
-        let solved = solving::solve((&settings, goal), name, loaded, Some(observer), args.load.quiet, None, |_, _| ())?;
+        let start = solving::Start { settings: &settings, stored: None, observer: Some(observer), peers: None };
+        let solved = solving::solve(start, goal, name, loaded, args.load.quiet, |_, _| ())?;
         let (seconds, rate, interrupted) = (solved.seconds, solved.rate(), solved.interrupted);
         return Ok(Light { solution: solved.solver.solution(), settings, seconds, rate, interrupted });
     };

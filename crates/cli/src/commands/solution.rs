@@ -18,12 +18,12 @@ pub fn describe(name: &str, as_json: bool) -> anyhow::Result<Ending> {
         println!("{:#}", report(name, &p, &light, &sums, can_go_on));
         return Ok(Ending::Done);
     }
-    println!("scene      {}", p.scene);
-    println!("method     {} ({})", p.method.name(), p.software);
-    println!("from       {}", source_text(&p));
+    println!("scene      {}", line(&p.scene));
+    println!("method     {} ({})", p.method.name(), line(&p.software));
+    println!("from       {}", line(&source_text(&p)));
     println!("rays       {}, {}", p.rays, seeds_text(&p));
     let settings: Vec<String> = p.settings.iter().map(|(name, value)| format!("{name} {value}")).collect();
-    println!("settings   {}", settings.join(", "));
+    println!("settings   {}", line(&settings.join(", ")));
     println!("patches    {} ({} emitting), area {:.4} m²", light.len(), sums.emitting, sums.area);
     println!("error      {}", error_text(p.relative_error));
     println!("error bars {:.2} % of the patches have one", 100.0 * sums.known as f64 / light.len().max(1) as f64);
@@ -49,6 +49,11 @@ fn report(name: &str, p: &Provenance, light: &PatchLight, sums: &Sums, can_go_on
         "area": sums.area, "arriving_power_rgb": sums.power.to_array(),
         "relative_error": Some(p.relative_error).filter(|e| e.is_finite()),
     })
+}
+
+/// What a file says, in one line.
+fn line(text: &str) -> String {
+    crate::plain(text).replace('\n', "\\n")
 }
 
 /// Where the scene was, and how it was cut.

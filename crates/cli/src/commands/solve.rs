@@ -15,6 +15,7 @@ use crate::failure::Ending;
 use crate::input::Loaded;
 use crate::output::{Output, extension};
 use crate::settings::Settings;
+use crate::stored::Stored;
 use crate::{input, interrupt, stored};
 
 /// Runs the command.
@@ -30,9 +31,13 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     interrupt::install();
     let start = Instant::now();
     let work = Work { writes_solution: true, is_silent: !leads, ..solving::work(&args.solve, args.part) };
-    let loaded = input::load(&args.load, None, &work)?;
+    let mut loaded = input::load(&args.load, None, &work)?;
     let settings = settings(args, &loaded)?;
     let output = leads.then(|| Output::open(&path)).transpose()?;
+    if !args.overwrite {
+        spare(&path, &loaded)?;
+    }
+    let stored = loaded.stored.take();
     commands::print_warnings(&loaded.warnings, quiet);
     if !quiet {
         crate::say!("{}: {} triangles, {} patches", loaded.name, loaded.patches.triangle_count(), loaded.patches.len());
@@ -44,7 +49,8 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     let mut last = Instant::now();
     let mut warnings = loaded.warnings.clone();
     let (mut checkpoints, mut failed) = (0, 0);
-    let solved = solving::solve((&settings, goal), &args.load.scene, &loaded, None, quiet, peers, |solver, log| {
+    let start_from = solving::Start { settings: &settings, stored, observer: None, peers };
+    let solved = solving::solve(start_from, goal, &args.load.scene, &loaded, quiet, |solver, log| {
         if !leads || args.checkpoint.0.is_none_or(|interval| last.elapsed().as_secs_f64() < interval) {
             return;
         }
@@ -66,7 +72,7 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     })?;
     let solver = &solved.solver;
     let idle = solved.before > 0 && solver.rays() == solved.before;
-    let error = keeper.keep(solver)?;
+    let error = keeper.keep(solver).or_else(|error| Err(keeper.rescue(solver, error)))?;
 
     let solution = solver.solution();
     let balance = solution.balance();
@@ -135,6 +141,25 @@ fn settings(args: &SolutionArgs, loaded: &Loaded) -> anyhow::Result<Settings> {
     Settings::stored(name, file.provenance(), &args.solve)
 }
 
+/// Refuses to replace light of the same scene that may have taken long, unless it is what is gone on with.
+fn spare(path: &Path, loaded: &Loaded) -> anyhow::Result<()> {
+    let same = |a: &Path| std::fs::canonicalize(a).ok();
+    let input = loaded.stored.as_ref().and_then(|stored| same(Path::new(stored.name())));
+    if !path.is_file() || input.is_some() && input == same(path) {
+        return Ok(());
+    }
+    let name = path.display().to_string();
+    // What cannot be read is not worth keeping.
+    let Ok(there) = Stored::open(&name) else { return Ok(()) };
+    let Ok(file) = there.read() else { return Ok(()) };
+    if file.provenance().fingerprint != loaded.patches.fingerprint() {
+        return Ok(());
+    }
+    let rays = file.provenance().rays;
+    let go_on = if file.can_go_on() { format!("`twinray solve {name}` goes on with it, ") } else { String::new() };
+    bail!("{name}: holds {rays} rays of this scene already: {go_on}-o names another file, --overwrite begins anew")
+}
+
 /// Keeps what a solver has in a file.
 struct Keeper<'a> {
     /// `None` where another process writes.
@@ -172,6 +197,14 @@ impl<'a> Keeper<'a> {
         let area = patches.patches().map(|p| patches.area(p)).collect();
         let emits = patches.patches().map(|p| !patches.emission(p).is_black()).collect();
         let (light, error) = record.light(area, emits);
+        // A file that nobody can read must not take the place of a good one.
+        let finite = light.irradiance.iter().flatten().all(|x| x.is_finite()) && !error.is_nan();
+        let sound = record.check().map_err(|e| e.to_string());
+        if let Err(reason) = sound.and(if finite { Ok(()) } else { Err("irradiance beyond all numbers".to_owned()) }) {
+            bail!(
+                "the solve has come to numbers that a file cannot hold ({reason}): is the scene's light in the unit that it should be?"
+            );
+        }
         let relative_error = error as f32;
         let provenance = Provenance { rays: record.rays(), relative_error, ..self.provenance.clone() };
         let file = SolutionFile { provenance, light, record: Some(record) };
@@ -179,6 +212,23 @@ impl<'a> Keeper<'a> {
             output.put(|out| format::write_solution(&file, out))?;
         }
         Ok(error)
+    }
+}
+
+impl Keeper<'_> {
+    /// Keeps what has no room in its own place in the folder for temporary files instead; `error` is why, and is told with the place.
+    fn rescue(&mut self, solver: &Solver, error: anyhow::Error) -> anyhow::Error {
+        let Some(output) = &self.output else { return error };
+        let name = Path::new(output.name()).file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let path = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
+        let kept = Output::open(&path).and_then(|output| {
+            self.output = Some(output);
+            self.keep(solver)
+        });
+        match kept {
+            Ok(_) => error.context(format!("the result is in {} instead; move it where it belongs", path.display())),
+            Err(_) => error,
+        }
     }
 }
 

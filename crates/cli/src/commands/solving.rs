@@ -10,6 +10,7 @@ use crate::input::Loaded;
 use crate::interrupt;
 use crate::progress::{Goal, Progress};
 use crate::settings::Settings;
+use crate::stored::Stored;
 
 /// Rays per patch where the user does not say.
 const DEFAULT_RAYS_PER_PATCH: u64 = 400;
@@ -33,19 +34,30 @@ impl Solved<'_> {
     }
 }
 
-/// Solves until the goal or a signal; `name` is what the user called the scene. A record is gone on from. `look` is called
-/// after every wave. With peers, all of whom do the same, a wave's rays are shared.
+/// What a solve starts from.
+pub struct Start<'a, 's> {
+    /// Its settings.
+    pub settings: &'s Settings,
+    /// The file to go on with.
+    pub stored: Option<Stored>,
+    /// A fixed camera.
+    pub observer: Option<Observer>,
+    /// Other processes, all of whom do the same and share a wave's rays.
+    pub peers: Option<&'a dyn Peers>,
+}
+
+/// Solves until the goal or a signal; `name` is what the user called the scene. `look` is called after every wave.
 pub fn solve<'a>(
-    (settings, goal): (&Settings, Goal),
+    start: Start<'a, '_>,
+    goal: Goal,
     name: &str,
     loaded: &'a Loaded,
-    observer: Option<Observer>,
     quiet: bool,
-    peers: Option<&'a dyn Peers>,
     mut look: impl FnMut(&Solver, &Progress),
 ) -> anyhow::Result<Solved<'a>> {
+    let Start { settings, stored, observer, peers } = start;
     let mut progress = Progress::new(goal, quiet);
-    let mut solver = match &loaded.stored {
+    let mut solver = match &stored {
         None => {
             Solver::among(&loaded.patches, settings.params(), observer, peers).map_err(|e| anyhow!("{name}: {e}"))?
         }
@@ -56,14 +68,18 @@ pub fn solve<'a>(
                 .map_err(|e| anyhow!("{name}: {e}"))?
         }
     };
-    let before = if loaded.stored.is_some() { solver.rays() } else { 0 };
+    let before = if stored.is_some() { solver.rays() } else { 0 };
+    // Its room on the disk is free once it is replaced.
+    drop(stored);
     progress = progress.after(before);
     let limit = if let Goal::Rays(n) = goal { n } else { u64::MAX };
-    // The warm start alone is too coarse to be judged: at least one wave is shot.
-    let error = |solver: &Solver| if solver.is_new() { f64::INFINITY } else { solver.relative_error() };
     // Clocks and signals may say other things elsewhere: nobody stops alone.
     let any = |yes: bool| peers.map_or(yes, |p| p.any(yes));
-    while !any(progress.is_reached(solver.rays(), || error(&solver)) || interrupt::requested()) {
+    // The warm start alone is too coarse to be judged or kept: at least one wave is shot.
+    let done = |solver: &Solver, progress: &Progress| {
+        !solver.is_new() && progress.is_reached(solver.rays(), || solver.relative_error())
+    };
+    while !any(done(&solver, &progress) || interrupt::requested()) {
         solver.advance(limit);
         if progress.wants_update() {
             progress.update(solver.rays(), solver.relative_error());

@@ -33,12 +33,12 @@ fn a_solve_that_goes_on_is_the_unbroken_one() {
     let place = Place::new();
     for preset in ["default", "paper"] {
         let solve = |args: &[&str]| place.done(&[&["solve"], args, &["--preset", preset]].concat());
-        let fresh = |rays, name| solve(&[&["cornell", "-o", name, "--rays", rays][..], &CUT].concat());
+        let fresh = |rays, name| solve(&[&["cornell", "-o", name, "--rays", rays, "--overwrite"][..], &CUT].concat());
         fresh("300k", "unbroken.twin");
         fresh("60k", "broken.twin");
         solve(&["broken.twin", "--rays", "150k", "--threads", "1", "--seed", "1"]);
         // Elsewhere, and with checkpoints all the way.
-        solve(&["broken.twin", "--rays", "300k", "-o", "else.twin", "--checkpoint", "0.001s"]);
+        solve(&["broken.twin", "--rays", "300k", "-o", "else.twin", "--checkpoint", "0.001s", "--overwrite"]);
         assert!(place.read("else.twin") == place.read("unbroken.twin"), "{preset}");
         assert!(rays(&place, "broken.twin") < rays(&place, "else.twin"));
         // A goal that is reached leaves the file as it is, to the bit.
@@ -206,6 +206,38 @@ fn a_folder_that_is_read_only_is_named_before_the_work() {
     let run = place.run(&["solve", "cornell", "-o", "locked/x.twin", "--time", "600"]);
     assert_eq!(run.code, Some(2));
     assert!(run.stderr.contains("locked/x.twin: cannot write into the folder locked"), "{}", run.stderr);
+}
+
+/// What may have taken long is not replaced by accident.
+#[test]
+fn light_of_the_same_scene_is_not_replaced() {
+    let place = Place::new();
+    let solve = ["solve", "cornell", "--rays", "20k", "--patches", "500"];
+    place.done(&solve);
+    refused(&place, &solve, &["cornell.twin: holds", "twinray solve cornell.twin", "--overwrite"]);
+    refused(&place, &["solve", "cornell.twin", "--rays", "1M", "-o", "gone/x.twin"], &["no folder"]);
+    place.done(&["solve", "cornell.twin", "--rays", "40k", "-o", "more.twin"]);
+    refused(&place, &["solve", "cornell.twin", "--rays", "60k", "-o", "more.twin"], &["more.twin: holds"]);
+    place.done(&["solve", "cornell.twin", "--rays", "60k", "-o", "more.twin", "--overwrite"]);
+    place.done(&[&solve[..], &["--overwrite"]].concat());
+    // Other scenes, and what is no solution, are replaced as by any program.
+    place.write("cornell.twin", "notes");
+    place.done(&solve);
+    place.done(&["solve", "doorway", "-o", "cornell.twin", "--rays", "20k", "--patches", "900"]);
+    refused(&place, &["merge", "more.twin", "-o", "more.twin"], &["more.twin: holds a solve", "another name"]);
+}
+
+/// Names in files command no terminal.
+#[test]
+#[cfg(unix)]
+fn names_in_files_command_no_terminal() {
+    let place = Place::new();
+    place.write("floor.obj", FLOOR);
+    std::fs::rename(place.path("floor.obj"), place.path("a\u{1b}[2Jb.obj")).unwrap();
+    let run = place.done(&["solve", "a\u{1b}[2Jb.obj", "--patches", "90", "--rays", "20k", "-o", "x.twin"]);
+    assert!(!run.stderr.contains('\u{1b}') && run.stderr.contains("a\\u{1b}[2Jb"), "{}", run.stderr);
+    let info = place.done(&["info", "x.twin"]);
+    assert!(!info.stdout.contains('\u{1b}') && info.stdout.contains("a\\u{1b}[2Jb.obj"), "{}", info.stdout);
 }
 
 /// Two programs never write to one place.

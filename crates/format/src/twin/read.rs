@@ -140,7 +140,7 @@ impl<'a> StoredSolution<'a> {
 
     fn waves(&self) -> Result<WavesRecord<'a>, FormatError> {
         let (patches, glossy) = (self.patches, self.glossy);
-        let totals = self.sections.rows::<u64>("totals", Kind::U64, 1 + TALLY_WORDS)?;
+        let totals = self.sections.rows::<u64>("totals", Kind::U64, 2 + TALLY_WORDS)?;
         let runs = match self.can_go_on {
             true => {
                 Some([self.run(["run-0", "radiance-0"], None)?, self.run(["run-1", "radiance-1"], Some("sample-1"))?])
@@ -150,7 +150,8 @@ impl<'a> StoredSolution<'a> {
         Ok(WavesRecord {
             rays: self.provenance.rays,
             weight: f64::from_bits(totals[0]),
-            tally: tally(&totals[1..]),
+            unit: f64::from_bits(totals[1]),
+            tally: tally(&totals[2..]),
             deposits: self.sections.rows("deposits", Kind::F64, patches)?,
             squares: self.sections.rows("squares", Kind::F32, patches)?,
             difference: self.sections.rows("difference", Kind::F32, patches)?,

@@ -39,7 +39,7 @@ pub fn write_solution(solution: &SolutionFile, out: &mut dyn Write) -> io::Resul
 }
 
 fn waves<'a>(record: &'a WavesRecord, all: &mut Vec<Section<'a>>) {
-    let totals = [&[record.weight.to_bits()][..], &record.tally.to_words()].concat();
+    let totals = [&[record.weight.to_bits(), record.unit.to_bits()][..], &record.tally.to_words()].concat();
     all.extend([
         Section::owned("totals", Kind::U64, totals),
         Section::rows("deposits", Kind::F64, &record.deposits),

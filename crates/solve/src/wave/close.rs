@@ -37,8 +37,10 @@ pub(crate) struct SourceState {
 pub(crate) struct OutputState {
     /// Per patch: Σ deposits, W.
     pub deposits: Vec<[f64; 3]>,
-    /// Per patch.
+    /// Per patch, in `unit`s.
     pub evidence: Vec<PatchEvidence>,
+    /// W: a power of two near the power of the scene, so that squares fit into single precision however bright it is.
+    pub unit: f64,
     /// Per glossy patch: Σ deposit · albedo(ω_in).
     pub reflected: Vec<[f32; 3]>,
     /// Per glossy patch, if there is an observer: Σ deposit · lobe(ω_in, ω_eye), of light straight from emitting patches
@@ -54,11 +56,13 @@ pub(crate) const BYTES_PER_GLOSSY_PATCH: usize = 12 + 2 * size_of::<PackedRepres
 pub(crate) const BYTES_PER_OBSERVED_PATCH: usize = 24;
 
 impl OutputState {
-    pub(crate) fn new(patches: usize, glossy: &GlossyPatches) -> Self {
+    pub(crate) fn new(scene: &PatchScene, glossy: &GlossyPatches) -> Self {
+        let patches = scene.len();
         let lobes = glossy.patches().len();
         Self {
             deposits: vec![[0.0; 3]; patches],
             evidence: vec![PatchEvidence::default(); patches],
+            unit: power_of_two(scene),
             reflected: vec![[0.0; 3]; lobes],
             observed: vec![[[0.0; 3]; 2]; if glossy.is_observed() { lobes } else { 0 }],
         }
@@ -161,6 +165,7 @@ pub(super) struct Part<'a> {
     unshot: &'a mut [Source],
     deposits: &'a mut [[f64; 3]],
     evidence: &'a mut [PatchEvidence],
+    per_unit: f64,
     representatives: &'a mut [PackedRepresentative],
     reflected: &'a mut [[f32; 3]],
     observed: &'a mut [[[f32; 3]; 2]],
@@ -200,6 +205,7 @@ fn parts<'a>(
                 unshot: take(&mut unshot, patches),
                 deposits: take(&mut deposits, patches),
                 evidence: take(&mut evidence, patches),
+                per_unit: 1.0 / output.unit,
                 representatives: take(&mut representatives, lobes),
                 reflected: take(&mut reflected, lobes),
                 observed: take(&mut observed, lobes),
@@ -252,10 +258,11 @@ impl Part<'_> {
         }
         let entered = arrived * closing.output;
         self.deposits[i] = (Rgb::from_array(self.deposits[i]) + entered).to_array();
-        let squares = sum.squares as f64 * closing.units.square.value() * closing.output * closing.output;
+        let (scale, per_unit) = (closing.output, self.per_unit);
+        let squares = sum.squares as f64 * closing.units.square.value() * scale * scale * per_unit * per_unit;
         let evidence = &mut self.evidence[i];
         evidence.squares += squares as f32;
-        evidence.difference += (closing.sign * entered.luminance()) as f32;
+        evidence.difference += (closing.sign * entered.luminance() * per_unit) as f32;
         evidence.hits = evidence.hits.saturating_add(u32::try_from(sum.hits).unwrap_or(u32::MAX));
     }
 
@@ -321,6 +328,13 @@ impl Part<'_> {
         };
         source.constant = if sample { emitted } else { next }.to_f32();
     }
+}
+
+/// The largest power of two that is not above the power of lamps and sky. As a unit it changes no digit.
+fn power_of_two(scene: &PatchScene) -> f64 {
+    let sky = scene.environment().map_or(0.0, |e| e.power().luminance());
+    let power = scene.emitted_power().luminance() + sky;
+    if power > 0.0 && power.is_finite() { libm::scalbn(1.0, libm::ilogb(power).clamp(-400, 400)) } else { 1.0 }
 }
 
 /// Albedo of a diffuse patch.

@@ -156,7 +156,7 @@ fn what_does_not_fit_is_refused() {
     };
     let said = spoilt(&|bad| bad.deposits.to_mut()[7][1] = f64::NAN);
     assert!(said.contains("\"deposits\", entry 7"), "{said}");
-    assert!(spoilt(&|bad| bad.runs.as_mut().unwrap()[1].words[0] = u64::MAX).contains("run-1"));
+    assert!(spoilt(&|bad| bad.runs.as_mut().unwrap()[1].words[0] = u64::MAX).contains("rays"));
     assert!(spoilt(&|bad| bad.runs.as_mut().unwrap()[0].words[6] = 7f64.to_bits()).contains("shares"));
     assert!(spoilt(&|bad| bad.runs.as_mut().unwrap()[0].radiance.to_mut()[3][0] = f32::NAN).contains("radiance-0"));
     assert!(spoilt(&|bad| bad.hits.to_mut().truncate(9)).contains("hits"));
@@ -246,4 +246,26 @@ fn merging_divides_the_variance() {
     }
     let share = |n: u32| f64::from(n) / f64::from(count);
     assert!((share(within) - 0.70).abs() < 0.04 && (share(twice) - 0.96).abs() < 0.02, "{within} {twice} of {count}");
+}
+
+/// However bright a scene is, squares fit into single precision: a power of two in the light changes no digit of them.
+#[test]
+fn squares_fit_however_bright_the_light_is() {
+    let solve = |factor: f64| {
+        let mut authored = builtin::cornell(false);
+        authored.materials.iter_mut().for_each(|m| m.emission = m.emission * factor);
+        let scene = cut(&authored, 300);
+        let mut solver = Solver::new(&scene, Params::default_preset(1), None).unwrap();
+        solver.run(100_000);
+        solver.record().check().unwrap();
+        (waves(copied(&solver.record())), solver.relative_error())
+    };
+    let (usual, error) = solve(1.0);
+    assert!(usual.squares.iter().any(|s| *s > 0.0));
+    for exponent in [-90, 30, 90] {
+        let (other, same) = solve(2f64.powi(exponent));
+        assert_eq!(other.unit, usual.unit * 2f64.powi(exponent));
+        assert!(other.squares == usual.squares && other.difference == usual.difference && other.hits == usual.hits);
+        assert!((same / error - 1.0).abs() < 1e-12, "{same} against {error}");
+    }
 }
