@@ -17,7 +17,7 @@ use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
 use crate::settings::Settings;
-use crate::{commands, interrupt};
+use crate::{commands, interrupt, stored};
 
 /// Camera rays per pixel where the user does not say.
 const DEFAULT_SAMPLES: u32 = 16;
@@ -59,6 +59,13 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         LobesArg::Patches => Lobes::Patches,
     };
     let options = PictureOptions { width, height, samples, flat: args.flat, lobes };
+    if !solution.is_observed() && (args.flat || matches!(lobes, Lobes::Patches)) {
+        let matte = format!(
+            "{}: glossy surfaces look matte with --flat and --lobes patches, since a file knows no camera: render the scene itself",
+            args.load.scene
+        );
+        commands::print_warnings(&[matte], args.load.quiet);
+    }
     let picture = render::render(&loaded.patches, &solution, camera, &options);
     let factor = exposure(args).factor(&picture);
     let how = format!("{} rays, seed {}, preset {:?}", solution.rays(), settings.seed, settings.preset);
@@ -73,11 +80,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     if !args.load.quiet {
         crate::say!("{}", commands::balance_line(&balance));
         crate::say!(
-            "{}: {} rays {}in {seconds:.1} s ({:.2} M/s), estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
+            "{}: {} rays {} in {seconds:.1} s{}, estimated error {:.2} %, seed {}; picture in {drawing:.1} s, exposure {:+.2} EV",
             path.display(),
             solution.rays(),
-            if loaded.stored.is_some() { "loaded " } else { "" },
-            rate * 1e-6,
+            if loaded.stored.is_some() { "read" } else { "shot" },
+            if rate > 0.0 { format!(" ({:.2} M/s)", rate * 1e-6) } else { String::new() },
             100.0 * solution.relative_error(),
             settings.seed,
             factor.log2(),
@@ -132,11 +139,11 @@ fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<
     }
     let start = Instant::now();
     let file = stored.read()?;
-    let settings = Settings::stored(name, file.provenance(), &args.solve)?;
     let record = file.record().map_err(|e| anyhow!("{e}"))?;
     let record = record.ok_or_else(|| {
         anyhow!("{name}: is a reference, which knows no reflections; expected a solve, as `twinray solve` writes it")
     })?;
+    let settings = Settings::stored(name, file.provenance(), &args.solve)?;
     let solution = record.solution(&loaded.patches, &settings.params()).map_err(|e| anyhow!("{name}: {e}"))?;
     Ok(Light { solution, settings, seconds: start.elapsed().as_secs_f64(), rate: 0.0, interrupted: false })
 }
@@ -145,7 +152,11 @@ fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<
 fn work(args: &RenderArgs) -> Work {
     let is_traced = args.path.method == MethodArg::Path;
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
-    let solve = if is_traced { Work::default() } else { solving::work(&args.solve, None) };
+    let solve = if is_traced || stored::is_solution(&args.load.scene) {
+        Work::default()
+    } else {
+        solving::work(&args.solve, None)
+    };
     Work { picture: Some(PictureWork { size: args.size, samples, is_traced }), ..solve }
 }
 

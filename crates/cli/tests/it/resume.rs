@@ -59,7 +59,7 @@ fn a_solution_stands_for_its_scene() {
     place.done(&[&["solve", "cornell"][..], &cut].concat());
     place.done(&[&["render", "cornell", "-o", "solved.png"][..], &cut, &small].concat());
     let run = place.done(&[&["render", "cornell.twin", "-o", "kept.png"][..], &small].concat());
-    assert!(run.stderr.contains("rays loaded"), "{}", run.stderr);
+    assert!(run.stderr.contains("rays read in"), "{}", run.stderr);
     assert!(place.read("kept.png") == place.read("solved.png"), "the picture of a file is that of its solve");
     // Another camera needs no other solve.
     let there = ["--eye", "0.1,0.4,-0.5", "--target", "0.3,0.1,0.3", "--size", "64x48"];

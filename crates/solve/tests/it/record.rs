@@ -253,7 +253,7 @@ fn merging_divides_the_variance() {
 fn squares_fit_however_bright_the_light_is() {
     let solve = |factor: f64| {
         let mut authored = builtin::cornell(false);
-        authored.materials.iter_mut().for_each(|m| m.emission = m.emission * factor);
+        authored.materials.iter_mut().for_each(|m| m.emission *= factor);
         let scene = cut(&authored, 300);
         let mut solver = Solver::new(&scene, Params::default_preset(1), None).unwrap();
         solver.run(100_000);
