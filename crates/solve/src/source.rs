@@ -48,7 +48,7 @@ impl Source {
     }
 }
 
-/// The one remembered sample of a glossy patch's incoming light (paper §2.1), as [`crate::representative`] explains.
+/// The one remembered sample of a glossy patch's incoming light (paper §2.1), as `representative` explains.
 ///
 /// Of the stored irradiance only its colour counts, since its size is made C by scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

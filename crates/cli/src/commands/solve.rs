@@ -72,7 +72,7 @@ pub fn run(args: &SolutionArgs, peers: Option<&dyn Peers>) -> anyhow::Result<End
     })?;
     let solver = &solved.solver;
     let idle = solved.before > 0 && solver.rays() == solved.before;
-    let error = keeper.keep(solver).or_else(|error| Err(keeper.rescue(solver, error)))?;
+    let error = keeper.keep(solver).map_err(|error| keeper.rescue(solver, error))?;
 
     let solution = solver.solution();
     let balance = solution.balance();
