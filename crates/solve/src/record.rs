@@ -139,6 +139,22 @@ pub const RUN_WORDS: usize = 24 + TALLY_WORDS;
 pub const TALLY_WORDS: usize = 17;
 
 impl Record<'_> {
+    /// The same, borrowing from nobody.
+    pub fn into_owned(self) -> Record<'static> {
+        match self {
+            Record::Waves(waves) => Record::Waves(waves.into_owned()),
+            Record::Sequential(s) => Record::Sequential(SequentialRecord {
+                irradiance: owned(s.irradiance),
+                squares: owned(s.squares),
+                hits: owned(s.hits),
+                tree: owned(s.tree),
+                glossy: owned(s.glossy),
+                memory: owned(s.memory),
+                ..s
+            }),
+        }
+    }
+
     /// Rays shot, n.
     pub fn rays(&self) -> u64 {
         match self {
@@ -240,7 +256,31 @@ impl Record<'_> {
     }
 }
 
-impl<'a> WavesRecord<'a> {
+fn owned<T: Clone>(array: Cow<[T]>) -> Cow<'static, [T]> {
+    Cow::Owned(array.into_owned())
+}
+
+impl WavesRecord<'_> {
+    /// The same, borrowing from nobody.
+    pub fn into_owned(self) -> WavesRecord<'static> {
+        let run = |run: RunRecord| RunRecord {
+            words: run.words,
+            radiance: owned(run.radiance),
+            representatives: owned(run.representatives),
+        };
+        WavesRecord {
+            deposits: owned(self.deposits),
+            squares: owned(self.squares),
+            difference: owned(self.difference),
+            hits: owned(self.hits),
+            glossy: owned(self.glossy),
+            reflected: owned(self.reflected),
+            representatives: owned(self.representatives),
+            runs: self.runs.map(|runs| runs.map(run)),
+            ..self
+        }
+    }
+
     pub(crate) fn sums(&self) -> Sums<'_> {
         Sums {
             rays: self.rays,

@@ -6,7 +6,7 @@ use std::sync::{Condvar, Mutex};
 use std::time::Duration;
 
 use twinray_scene::{Environment, PatchScene, Rgb, Scene, builtin};
-use twinray_solve::record::{RunRecord, WavesRecord};
+use twinray_solve::record::WavesRecord;
 use twinray_solve::{Observer, Params, Peers, Record, Schedule, SolveError, Solver, Stage};
 
 use super::{cut, glossy_cornell};
@@ -211,23 +211,8 @@ fn a_solve_may_change_hands() {
 }
 
 fn waves(record: Record) -> WavesRecord<'static> {
-    let Record::Waves(w) = record else { panic!("the paper's schedule") };
-    let run = |r: RunRecord| RunRecord {
-        words: r.words,
-        radiance: r.radiance.into_owned().into(),
-        representatives: r.representatives.into_owned().into(),
-    };
-    WavesRecord {
-        deposits: w.deposits.into_owned().into(),
-        squares: w.squares.into_owned().into(),
-        difference: w.difference.into_owned().into(),
-        hits: w.hits.into_owned().into(),
-        glossy: w.glossy.into_owned().into(),
-        reflected: w.reflected.into_owned().into(),
-        representatives: w.representatives.into_owned().into(),
-        runs: w.runs.map(|runs| runs.map(run)),
-        ..w
-    }
+    let Record::Waves(waves) = record else { panic!("the paper's schedule") };
+    waves.into_owned()
 }
 
 /// Nobody waits for whoever does something else.

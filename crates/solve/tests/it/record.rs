@@ -18,38 +18,6 @@ fn waves(record: Record) -> WavesRecord {
     }
 }
 
-/// What an owner of nothing but the record knows: everything borrowed is copied, as through a file.
-fn copied(record: &Record) -> Record<'static> {
-    match record.clone() {
-        Record::Waves(w) => Record::Waves(WavesRecord {
-            deposits: w.deposits.into_owned().into(),
-            squares: w.squares.into_owned().into(),
-            difference: w.difference.into_owned().into(),
-            hits: w.hits.into_owned().into(),
-            glossy: w.glossy.into_owned().into(),
-            reflected: w.reflected.into_owned().into(),
-            representatives: w.representatives.into_owned().into(),
-            runs: w.runs.map(|runs| {
-                runs.map(|r| twinray_solve::record::RunRecord {
-                    words: r.words,
-                    radiance: r.radiance.into_owned().into(),
-                    representatives: r.representatives.into_owned().into(),
-                })
-            }),
-            ..w
-        }),
-        Record::Sequential(s) => Record::Sequential(twinray_solve::record::SequentialRecord {
-            irradiance: s.irradiance.into_owned().into(),
-            squares: s.squares.into_owned().into(),
-            hits: s.hits.into_owned().into(),
-            tree: s.tree.into_owned().into(),
-            glossy: s.glossy.into_owned().into(),
-            memory: s.memory.into_owned().into(),
-            ..s
-        }),
-    }
-}
-
 /// Stopped at any wave, on other threads, by either schedule, diffuse or glossy, under a sky or not.
 #[test]
 fn a_resumed_solve_is_the_unbroken_one() {
@@ -70,7 +38,7 @@ fn a_resumed_solve_is_the_unbroken_one() {
         let mut stops = 0;
         while unbroken.rays() < 400_000 {
             unbroken.advance(u64::MAX);
-            let record = copied(&broken.record());
+            let record = broken.record().into_owned();
             let pool = rayon::ThreadPoolBuilder::new().num_threads(1 + stops % 3).build().unwrap();
             broken = pool.install(|| {
                 let mut resumed = Solver::resume(&scene, params.clone(), &record).unwrap();
@@ -110,7 +78,7 @@ fn a_black_scene_under_a_sky_goes_on() {
         let params = Params::default_preset(seed);
         let mut solver = Solver::new(&scene, params.clone(), None).unwrap();
         solver.run(100_000);
-        let mut resumed = Solver::resume(&scene, params, &copied(&solver.record())).unwrap();
+        let mut resumed = Solver::resume(&scene, params, &solver.record().into_owned()).unwrap();
         for solver in [&mut solver, &mut resumed] {
             solver.run(200_000);
         }
@@ -137,7 +105,7 @@ fn what_does_not_fit_is_refused() {
     let params = Params::default_preset(1);
     let mut solver = Solver::new(&small, params.clone(), None).unwrap();
     solver.run(50_000);
-    let record = copied(&solver.record());
+    let record = solver.record().into_owned();
     let refused = |scene: &PatchScene, params: Params, record: &Record| match Solver::resume(scene, params, record)
         .unwrap_err()
     {
@@ -171,7 +139,7 @@ fn the_order_of_merging_changes_no_bit() {
         .map(|seed| {
             let mut solver = Solver::new(&scene, Params::default_preset(seed), None).unwrap();
             solver.run(30_000 * seed);
-            waves(copied(&solver.record()))
+            waves(solver.record().into_owned())
         })
         .collect();
     let of = |seeds: &[usize]| merge(&seeds.iter().map(|&s| (s as u64, &records[s - 1])).collect::<Vec<_>>()).unwrap();
@@ -200,7 +168,7 @@ fn merging_divides_the_variance() {
         .map(|k| {
             let mut solver = Solver::new(&scene, params(100 + k as u64), None).unwrap();
             solver.run(80_000);
-            waves(copied(&solver.record()))
+            waves(solver.record().into_owned())
         })
         .collect();
     let seeded: Vec<(u64, &WavesRecord)> = records.iter().enumerate().map(|(k, r)| (k as u64, r)).collect();
@@ -258,7 +226,7 @@ fn squares_fit_however_bright_the_light_is() {
         let mut solver = Solver::new(&scene, Params::default_preset(1), None).unwrap();
         solver.run(100_000);
         solver.record().check().unwrap();
-        (waves(copied(&solver.record())), solver.relative_error())
+        (waves(solver.record().into_owned()), solver.relative_error())
     };
     let (usual, error) = solve(1.0);
     assert!(usual.squares.iter().any(|s| *s > 0.0));
