@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand, ValueEnum};
     furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse, \
     uneven, uneven-glowing.\n\
     A .twin file, the light of a scene as `solve` keeps it, stands for its scene.\n\
-    Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 (Ctrl-C) or 143 (SIGTERM) interrupted with \
+    Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 (Ctrl-C), 143 (SIGTERM) or 129 (a closed terminal) interrupted with \
     the result kept.")]
 pub struct Args {
     /// What to do.

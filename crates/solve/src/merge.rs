@@ -14,7 +14,8 @@ use crate::tally::Tally;
 const STREAM_MERGE: u64 = 8;
 
 /// Adds up solves of the default schedule by their seeds, which must differ; records that were added up before are
-/// welcome, by a number that no seed of theirs is (or what was chosen at random then would be chosen again). The sums are taken in the order of seeds, so the order of `parts` changes no bit.
+/// welcome, by a number that no seed of theirs is (or what was chosen at random then would be chosen again). The sums are
+/// taken in the order of seeds, so the order of `parts` changes no bit.
 ///
 /// # Errors
 /// If a record holds what no solve gives, or arrays differ in length.

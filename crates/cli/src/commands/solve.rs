@@ -213,10 +213,9 @@ impl<'a> Keeper<'a> {
         }
         Ok(error)
     }
-}
 
-impl Keeper<'_> {
-    /// Keeps what has no room in its own place in the folder for temporary files instead; `error` is why, and is told with the place.
+    /// Keeps what has no room in its own place in the folder for temporary files instead; `error` is why, and is told with
+    /// the place.
     fn rescue(&mut self, solver: &Solver, error: anyhow::Error) -> anyhow::Error {
         let Some(output) = &self.output else { return error };
         let name = Path::new(output.name()).file_name().unwrap_or_default().to_string_lossy().into_owned();
