@@ -75,8 +75,10 @@ pub struct Material {
     pub two_sided: bool,
     /// Where the surface is absent.
     pub opacity: Opacity,
-    /// True if light passes through (glass). Until materials transmit, such surfaces let rays straight through.
-    pub transmissive: bool,
+    /// How light passes through, for glass and the like; `None` if it does not.
+    pub transmission: Option<Transmission>,
+    /// Bumps of the visible surface; light is computed with geometric normals.
+    pub normal_map: Option<NormalMap>,
 }
 
 impl Default for Material {
@@ -88,7 +90,8 @@ impl Default for Material {
             emission_texture: None,
             two_sided: false,
             opacity: Opacity::Opaque,
-            transmissive: false,
+            transmission: None,
+            normal_map: None,
         }
     }
 }
@@ -145,6 +148,34 @@ pub enum Surface {
     },
 }
 
+/// Light that passes a surface instead of reaching its diffuse base: `KHR_materials_transmission` and
+/// `KHR_materials_volume`. The surface's lobe reflects what is left, and its roughness blurs what passes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transmission {
+    /// The share of the base that transmits, in [0, 1]; what passes is multiplied by the base colour.
+    pub factor: f64,
+    /// Linear texture whose R multiplies the factor.
+    pub texture: Option<TextureRef>,
+    /// What the surface encloses; `None` for a thin pane, which does not refract.
+    pub volume: Option<Volume>,
+}
+
+/// The inside of a closed body that light passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Attenuation coefficient, 1/m: what passes a length d is multiplied by exp(-d × this), per channel.
+    pub attenuation: Rgb,
+}
+
+/// A tangent-space normal map, as glTF has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalMap {
+    /// Linear texture of normals, 0 to 1 for -1 to 1.
+    pub texture: TextureRef,
+    /// Multiplies x and y.
+    pub scale: f64,
+}
+
 /// Where a surface is absent, from the alpha channel of its base colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Opacity {
@@ -156,6 +187,8 @@ pub enum Opacity {
         /// Alpha threshold, 0.5 by default in glTF.
         cutoff: f32,
     },
+    /// Present by chance, with alpha as the probability: what is behind shows through.
+    Blend,
 }
 
 /// A use of an image.

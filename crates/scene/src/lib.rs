@@ -17,7 +17,8 @@ pub mod texture;
 pub mod validate;
 
 pub use authored::{
-    Environment, Instance, Material, Mesh, Opacity, Scene, Surface, Texel, TextureImage, TextureRef, Wrap,
+    Environment, Instance, Material, Mesh, NormalMap, Opacity, Scene, Surface, Texel, TextureImage, TextureRef,
+    Transmission, Volume, Wrap,
 };
 pub use bvh::SurfaceHit;
 pub use camera::{Camera, Projection};

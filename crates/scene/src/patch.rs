@@ -673,7 +673,7 @@ pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) 
     let mut left_out = LeftOut::default();
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
-        if scene.materials[mesh.material].transmissive {
+        if scene.materials[mesh.material].transmission.is_some() {
             left_out.passed += mesh.triangles.len();
             continue;
         }

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Wrap};
+use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Transmission, Wrap};
 
 use super::container::Buffers;
 use super::json::Element;
@@ -132,7 +132,9 @@ impl Reader<'_, '_> {
         self.note_unread(element, transmissive, &name);
         let opacity = self.opacity(element, &name);
         let two_sided = element.flag("doubleSided");
-        Material { name, surface, emission, emission_texture, two_sided, opacity, transmissive }
+        let transmission = transmissive.then_some(Transmission { factor: 1.0, texture: None, volume: None });
+        let normal_map = None;
+        Material { name, surface, emission, emission_texture, two_sided, opacity, transmission, normal_map }
     }
 
     /// `emission` within the limits; a factor times a strength may also be no number at all.

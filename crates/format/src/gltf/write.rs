@@ -219,7 +219,7 @@ impl Writer {
             out["alphaMode"] = json!("MASK");
             out["alphaCutoff"] = json!(cutoff);
         }
-        if material.transmissive {
+        if material.transmission.is_some() {
             extensions.insert("KHR_materials_transmission".into(), json!({ "transmissionFactor": 1.0 }));
         }
         const WRITTEN: [&str; 4] = [

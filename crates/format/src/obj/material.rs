@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Wrap};
+use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Transmission, Wrap};
 
 use super::mtl::{Entry, Map};
 use crate::context::Context;
@@ -130,7 +130,8 @@ impl Materials {
             emission_texture,
             two_sided: true,
             opacity: self.mask(context, entry),
-            transmissive,
+            transmission: transmissive.then_some(Transmission { factor: 1.0 - opacity, texture: None, volume: None }),
+            normal_map: None,
         }
     }
 

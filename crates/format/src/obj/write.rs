@@ -152,7 +152,7 @@ fn write_material(
         colour(mtl, "Ke", material.emission);
         material.emission_texture.iter().for_each(|t| map(mtl, "map_Ke", t));
     }
-    if material.transmissive {
+    if material.transmission.is_some() {
         mtl.push_str("d 0.1\n");
     }
 }

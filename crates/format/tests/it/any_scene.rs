@@ -5,7 +5,7 @@ use proptest::array::uniform3;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use twinray_format::{Warning, write_glb};
-use twinray_scene::{Instance, Material, Mesh, Opacity, Rgb, Scene, Surface, Texel};
+use twinray_scene::{Instance, Material, Mesh, Opacity, Rgb, Scene, Surface, Texel, Transmission};
 
 use crate::support::{read, warnings};
 
@@ -46,7 +46,7 @@ fn material() -> impl Strategy<Value = Material> {
             surface,
             emission,
             two_sided,
-            transmissive,
+            transmission: transmissive.then_some(Transmission { factor: 1.0, texture: None, volume: None }),
             opacity: Opacity::Opaque,
             ..Material::default()
         },
@@ -127,7 +127,7 @@ proptest! {
             prop_assert_eq!((&m.name, &m.positions, &m.triangles), (&n.name, &n.positions, &n.triangles));
             prop_assert_eq!((&m.normals, &m.texcoords), (&n.normals, &n.texcoords));
             let (m, n) = (&again.materials[m.material], &scene.materials[n.material]);
-            prop_assert_eq!((&m.name, m.two_sided, m.transmissive), (&n.name, n.two_sided, n.transmissive));
+            prop_assert_eq!((&m.name, m.two_sided, m.transmission.is_some()), (&n.name, n.two_sided, n.transmission.is_some()));
             for c in 0..3 {
                 prop_assert!((m.emission[c] - n.emission[c]).abs() <= 1e-12 * n.emission[c], "{:?} {:?}", m.emission, n.emission);
             }

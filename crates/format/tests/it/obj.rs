@@ -83,7 +83,7 @@ fn materials_become_lambertian_phong_and_glass() {
     assert_warns(&reading, &["Kd + Ks", "\"shiny\""]);
     assert_eq!(materials[2].emission, Rgb::new(10.0, 20.0, 30.0));
     assert_eq!(colour(&materials[2].surface).factor, Rgb::BLACK, "a lamp without Kd reflects nothing");
-    assert!(materials[3].transmissive);
+    assert!(materials[3].transmission.is_some());
     assert!(matches!(materials[3].surface, Surface::Lambertian { .. }), "illum 1 has no highlight");
     assert_warns(&reading, &["lets light straight through", "\"glass\""]);
 }

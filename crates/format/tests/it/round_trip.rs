@@ -6,7 +6,7 @@ use glam::{DAffine3, DQuat, DVec3, dvec3};
 use twinray_format::{Reading, write_glb, write_obj};
 use twinray_scene::{
     Camera, Environment, Instance, Material, Mesh, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureImage,
-    TextureRef, Wrap,
+    TextureRef, Transmission, Wrap,
 };
 
 use crate::support::{colour, read, read_with, warnings, world_triangles};
@@ -33,7 +33,7 @@ fn everything() -> Scene {
             emission: Rgb::new(0.5, 0.25, 0.0),
             emission_texture: textured(Rgb::WHITE).texture,
             opacity: Opacity::Mask { cutoff: 0.25 },
-            transmissive: true,
+            transmission: Some(Transmission { factor: 1.0, texture: None, volume: None }),
             ..material(
                 "metal",
                 Surface::MetallicRoughness {
@@ -113,8 +113,8 @@ fn glb_keeps_everything_but_phong() {
     assert_eq!(read.images[0].rgba, scene.images[0].rgba);
     for (a, b) in read.materials.iter().zip(&scene.materials) {
         assert_eq!(
-            (&a.name, a.two_sided, a.opacity, a.transmissive),
-            (&b.name, b.two_sided, b.opacity, b.transmissive)
+            (&a.name, a.two_sided, a.opacity, a.transmission.is_some()),
+            (&b.name, b.two_sided, b.opacity, b.transmission.is_some())
         );
         assert!(close(a.emission, b.emission), "{a:?}");
         assert_eq!(a.emission_texture, b.emission_texture);
@@ -183,7 +183,7 @@ fn obj_keeps_triangles_and_matt_materials() {
         assert!(best < 1e-5, "{a:?} {b:?}");
     }
     for (a, b) in reading.scene.materials.iter().zip(&scene.materials) {
-        assert_eq!((&a.name, a.emission, a.transmissive), (&b.name, b.emission, b.transmissive));
+        assert_eq!((&a.name, a.emission, a.transmission.is_some()), (&b.name, b.emission, b.transmission.is_some()));
         assert_eq!(colour(&a.surface).factor, colour(&b.surface).factor);
         assert_eq!(colour(&a.surface).texture.is_some(), colour(&b.surface).texture.is_some());
         assert!(a.two_sided);
