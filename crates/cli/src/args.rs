@@ -98,6 +98,14 @@ pub enum Unit {
     M,
 }
 
+impl RenderArgs {
+    /// How light reaches the picture.
+    pub fn method(&self) -> MethodArg {
+        let of_patches = self.solve.preset == Some(Preset::Paper) || self.flat || self.lobes.is_some();
+        self.path.method.unwrap_or(if of_patches { MethodArg::Patches } else { MethodArg::Gather })
+    }
+}
+
 impl Unit {
     /// Metres per unit.
     pub fn metres(self) -> f64 {
@@ -223,9 +231,9 @@ pub struct RenderArgs {
     /// Show the raw patches instead of smooth light
     #[arg(long)]
     pub flat: bool,
-    /// Reflections in glossy surfaces: traced per pixel, or as the patches remember them
-    #[arg(long, value_enum, default_value = "traced")]
-    pub lobes: LobesArg,
+    /// With --method patches, reflections in glossy surfaces: traced per pixel, or as patches remember them [default: traced]
+    #[arg(long, value_enum)]
+    pub lobes: Option<LobesArg>,
     /// Exposure of PNGs: auto, or stops (EV) on radiance
     #[arg(long, value_name = "auto|EV", default_value = "auto", allow_hyphen_values = true, value_parser = exposure)]
     pub exposure: ExposureArg,
@@ -237,20 +245,22 @@ pub struct RenderArgs {
 /// How a picture is made.
 #[derive(Debug, clap::Args)]
 pub struct PathArgs {
-    /// patches: solve, then look; path: trace paths for every pixel, slowly and without bias, for comparison
-    #[arg(long, value_enum, default_value = "patches")]
-    pub method: MethodArg,
-    /// Camera rays per pixel [default: 16]; with --method path, paths [default: 64, or until --time or --error]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    /// How light reaches the picture [default: gather; patches with --preset paper, --flat or --lobes]
+    #[arg(long, value_enum)]
+    pub method: Option<MethodArg>,
+    /// Camera rays per pixel, the mean where noise decides [default: 64, or until --time or --error; with --method patches 16]
+    #[arg(long, visible_alias = "spp", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub samples: Option<u32>,
 }
 
 /// Methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// Solve, then look at the patches.
+    /// Solve, then trace the last bounce for every pixel: sharp shadows and textures.
+    Gather,
+    /// Solve, then look at the patches: the paper's own picture.
     Patches,
-    /// Path tracing.
+    /// Trace whole paths for every pixel, slowly and without bias, for comparison.
     Path,
 }
 

@@ -4,9 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use twinray::format::{self, Limits, PictureFile, SceneSource};
-use twinray::scene::brdf::MIN_ALPHA;
 use twinray::scene::complete::complete;
-use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, Surface, builtin};
+use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, builtin};
 
 use crate::args::{LoadArgs, ReadArgs, ViewArgs};
 use crate::estimate::{self, Expected, Work};
@@ -163,7 +162,6 @@ fn cut(
     for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
         warnings.push(format!("{name}: {addition}"));
     }
-    warnings.extend(sharp_lobes(&scene).map(|w| format!("{name}: {w}")));
     let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
     if patches.degenerate_triangles() > 0 {
         let count = patches.degenerate_triangles();
@@ -241,28 +239,5 @@ pub fn pick_camera<'a>(cameras: &'a [Camera], wish: Option<&str>) -> anyhow::Res
     by_name.or_else(by_index).ok_or_else(|| {
         let names: Vec<_> = cameras.iter().enumerate().map(|(i, c)| format!("{i} \"{}\"", c.name)).collect();
         anyhow!("--camera {wish}: no such camera; the scene has {}", names.join(", "))
-    })
-}
-
-/// Names the materials whose lobes are too sharp to live on patches.
-fn sharp_lobes(scene: &Scene) -> Option<String> {
-    let sharp: Vec<&str> = scene
-        .materials
-        .iter()
-        .filter(|m| match m.surface {
-            Surface::Lambertian { .. } => false,
-            Surface::MetallicRoughness { roughness, .. } => roughness * roughness < MIN_ALPHA * 0.999,
-            Surface::Phong { exponent, .. } => exponent > 2.0 / (MIN_ALPHA * MIN_ALPHA),
-        })
-        .map(|m| m.name.as_str())
-        .collect();
-    let shown = sharp.iter().take(6).map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", ");
-    (!sharp.is_empty()).then(|| {
-        format!(
-            "{} material(s) smoother than roughness {:.2} are blurred to it, since mirrors are not traced yet: {shown}{}",
-            sharp.len(),
-            MIN_ALPHA.sqrt(),
-            if sharp.len() > 6 { ", …" } else { "" }
-        )
     })
 }

@@ -17,6 +17,8 @@ pub enum Goal {
     Seconds(f64),
     /// A relative error, as estimated.
     Error(f64),
+    /// A number of rays, or seconds, whichever comes first.
+    First(u64, f64),
 }
 
 /// Progress of one solve.
@@ -74,6 +76,7 @@ impl Progress {
             Goal::Rays(n) => rays >= n,
             Goal::Seconds(s) => self.seconds() >= s,
             Goal::Error(e) => relative_error() <= e,
+            Goal::First(n, s) => rays >= n || self.seconds() >= s,
         }
     }
 
@@ -92,6 +95,10 @@ impl Progress {
         let rate = rays.saturating_sub(self.before) as f64 / seconds.max(1e-9);
         let (share, left) = match self.goal {
             Goal::Rays(n) => (rays as f64 / n as f64, n.saturating_sub(rays) as f64 / rate.max(1e-9)),
+            Goal::First(n, s) => {
+                let left = (n.saturating_sub(rays) as f64 / rate.max(1e-9)).min((s - seconds).max(0.0));
+                ((rays as f64 / n as f64).max(seconds / s), left)
+            }
             Goal::Seconds(s) => (seconds / s, (s - seconds).max(0.0)),
             // The error falls as the root of rays, or a little faster.
             Goal::Error(e) => {

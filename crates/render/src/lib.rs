@@ -5,15 +5,20 @@
 //! pixels that a screen shows; `reference` needs no solution and shares no transport with the solver.
 
 pub mod compare;
+mod direct;
 pub mod display;
 mod element;
+mod film;
+mod gather;
 mod grid;
 pub mod image;
 mod lights;
 pub mod picture;
 mod reconstruct;
 pub mod reference;
+mod vertex;
 
 pub use display::{Exposure, ToneCurve};
+pub use gather::{Gather, GatherOptions};
 pub use image::Image;
 pub use picture::{Lobes, Picture, PictureOptions, render};

@@ -4,8 +4,10 @@
 //! at the very point. Visibility is the caller's.
 
 use glam::DVec3;
-use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb, Side};
+
+/// The most candidates for one shadow ray.
+const MOST_CANDIDATES: u32 = 8;
 
 /// All that emits in a scene.
 pub(crate) struct Lights<'a> {
@@ -51,8 +53,7 @@ impl<'a> Lights<'a> {
 
     /// A direction from `point` about proportional to what shines there. `None` where the choice shines elsewhere: a
     /// hole, a back, or no light at all. The density then integrates to less than one.
-    pub fn sample(&self, point: DVec3, random: &mut Stream) -> Option<LightSample> {
-        let [choice, s, t] = std::array::from_fn(|_| random.uniform());
+    pub fn sample(&self, point: DVec3, choice: f64, [s, t]: [f64; 2]) -> Option<LightSample> {
         if choice < self.sky_share {
             let sky = self.scene.environment()?;
             let towards = sky.sample_direction([s, t]);
@@ -89,6 +90,14 @@ impl<'a> Lights<'a> {
         (1.0 - self.sky_share) * luminance / total * between.length_squared() * between.length() / cosine
     }
 
+    /// How many candidates are worth their while where one of them is chosen: many lamps need many.
+    pub fn candidates(&self) -> u32 {
+        let mut triangles: Vec<u32> = self.patches.iter().map(|&p| self.scene.triangle_of(p)).collect();
+        triangles.dedup();
+        let lamps = triangles.len() as u32 / 2 + u32::from(self.sky_share > 0.0);
+        lamps.clamp(1, MOST_CANDIDATES)
+    }
+
     /// Density per solid angle with which [`Lights::sample`] chooses `towards` for the sky.
     pub fn sky_density(&self, towards: DVec3) -> f64 {
         self.scene.environment().map_or(0.0, |sky| self.sky_share * sky.pdf_direction(towards))
@@ -98,6 +107,7 @@ impl<'a> Lights<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use twinray_scene::sample::Stream;
     use twinray_scene::{Environment, PatchOptions, Rgb, builtin};
     use twinray_testkit::chi2;
 
@@ -120,7 +130,8 @@ mod tests {
             let point = DVec3::new(0.13, -0.21, 0.08);
             let mut random = Stream::new(3, 0, 0);
             let samples = (0..400_000).map(|_| {
-                let sample = lights.sample(point, &mut random)?;
+                let [choice, s, t] = std::array::from_fn(|_| random.uniform());
+                let sample = lights.sample(point, choice, [s, t])?;
                 // A sky behind walls is sampled too; the density below is that of what a ray meets.
                 let hit = scene.trace(point, sample.towards);
                 (hit.is_none() == sample.end.is_none()).then(|| sample.towards.to_array())

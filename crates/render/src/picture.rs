@@ -8,14 +8,16 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use twinray_scene::brdf::Brdf;
+use twinray_scene::brdf::{Detail, attenuated};
 use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
+use crate::direct::{Part, direct};
 use crate::image::Image;
 use crate::lights::Lights;
 use crate::reconstruct::Reconstruction;
+use crate::vertex::{Look, Step, Vertex};
 
 /// Settings of a picture.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +71,8 @@ pub struct Picture {
 const FIREFLY: f64 = 6.0;
 /// Candidates for the lamp that a camera ray sees in a lobe, where no observer summed lamps up.
 const LAMPS: u32 = 16;
+/// Mirrors and sheets of glass that a camera ray passes at most.
+const MOST_PASSED: u32 = 32;
 /// One-sided backs that a camera ray passes at most.
 const MOST_BACKS: u32 = 16;
 
@@ -190,112 +194,103 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    /// Reflected and directly emitted radiance of what a camera ray meets.
+    /// Reflected and directly emitted radiance of what a camera ray meets, in mirrors and through glass too.
     fn seen(&self, origin: DVec3, direction: DVec3, u: LobeNumbers, light: &mut Light) -> (Rgb, Rgb) {
         let scene = self.scene;
         light.rays += 1;
-        let Some((hit, patch)) = first_side(scene, origin, direction) else {
+        let sky = |direction| scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction));
+        let Some((mut hit, mut patch)) = first_side(scene, origin, direction) else {
             light.empty += 1;
-            return (Rgb::BLACK, scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction)));
+            return (Rgb::BLACK, sky(direction));
         };
-        let smooth = if self.flat { self.reconstruction.flat(patch) } else { self.reconstruction.smooth(patch, &hit) };
-        let brdf = scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v));
-        let cosine = scene.normal(patch).dot(-direction).max(0.0);
-        let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
+        let (mut wo, mut throughput, mut emitted, mut medium) = (-direction, Rgb::WHITE, Rgb::BLACK, None);
+        let mut random = Stream::new(0, 0x57E9, u.index);
+        for _ in 0..MOST_PASSED {
+            if let Some(coefficient) = scene.medium_before(&hit, medium) {
+                throughput = throughput * attenuated(coefficient, hit.t);
+            }
+            emitted += throughput * scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
+            let vertex = Vertex::new(scene, &hit, patch, wo, Look::Display);
+            let way = match vertex.step(wo, random.uniform(), || [random.uniform(), random.uniform()]) {
+                Step::End => return (Rgb::BLACK, emitted),
+                Step::Scatter(factor) => {
+                    let reflected = throughput * factor * self.reflected(&vertex, &hit, wo, &u);
+                    if emitted.is_black() && reflected.luminance() > 0.0 {
+                        light.lit += 1;
+                        light.log2_sum += libm::log2(reflected.luminance());
+                    }
+                    return (reflected, emitted);
+                }
+                Step::On(way) => way,
+            };
+            (throughput, medium) = (throughput * way.factor, way.medium);
+            let Some(next) = scene.leave(scene.triangle_of(patch), way.side, vertex.point, way.direction) else {
+                return (Rgb::BLACK, emitted + throughput * sky(way.direction));
+            };
+            let Some(there) = scene.patch_of(&next) else { return (Rgb::BLACK, emitted) };
+            (hit, patch, wo) = (next, there, -way.direction);
+        }
+        (Rgb::BLACK, emitted)
+    }
+
+    /// Radiance that a point reflects towards `wo`: its base and its lobe.
+    fn reflected(&self, vertex: &Vertex, hit: &SurfaceHit, wo: DVec3, u: &LobeNumbers) -> Rgb {
+        let Vertex { patch, geometric, scatter, .. } = *vertex;
+        let brdf = scatter.brdf;
+        let smooth = if self.flat { self.reconstruction.flat(patch) } else { self.reconstruction.smooth(patch, hit) };
+        let cosine = geometric.dot(wo).max(0.0);
         let lobe = match self.traced && brdf.is_glossy() {
             true => {
                 // What the patches know bounds a single ray: a rare bright hit would be a white dot.
                 let even = (smooth.irradiance * brdf.lobe_albedo(cosine)).luminance() / PI;
                 let limit = FIREFLY * smooth.lobe[1].luminance().max(even);
-                let (traced, met) = self.lobe_ray(&hit, patch, &brdf, -direction, u.place);
+                let (traced, met) = self.lobe_ray(vertex, wo, u.place);
                 let direct = match &self.lamps {
                     None => smooth.lobe[0],
-                    Some(lamps) => met + self.lamp_in_lobe(lamps, &hit, patch, &brdf, -direction, u.index),
+                    Some(lamps) => {
+                        let mut random = Stream::new(0, 0x1A39, u.index);
+                        let numbers = || [random.uniform(), random.uniform()];
+                        met + direct(self.scene, lamps, vertex, wo, Part::Lobe, LAMPS, numbers)
+                    }
                 };
                 direct + traced * (limit / traced.luminance().max(1e-300)).min(1.0)
             }
             false => smooth.lobe[0] + smooth.lobe[1],
         };
         // The lobe of a single patch may be negative in the paper's representation; a picture never is.
-        let reflected = (smooth.irradiance * brdf.base_reflectance(cosine) / PI + lobe).map(|c| c.max(0.0));
-        if emitted.is_black() && reflected.luminance() > 0.0 {
-            light.lit += 1;
-            light.log2_sum += libm::log2(reflected.luminance());
-        }
-        (reflected, emitted)
+        (smooth.irradiance * brdf.base_reflectance(cosine) / PI + lobe).map(|c| c.max(0.0))
     }
 
-    /// Reflections follow the shading normal, as long as it is turned to the eye.
-    fn lobe_normal(&self, hit: &SurfaceHit, patch: PatchId, wo: DVec3) -> DVec3 {
-        let smooth = self.scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
-        if smooth.dot(wo) > 0.0 { smooth } else { self.scene.normal(patch) }
-    }
-
-    /// One sample of the lobe's reflection of everything but emitting patches; and, weighed against
-    /// [`View::lamp_in_lobe`], of what emits where the ray ends.
-    fn lobe_ray(&self, hit: &SurfaceHit, patch: PatchId, brdf: &Brdf, wo: DVec3, u: [f64; 2]) -> (Rgb, Rgb) {
+    /// One sample of the lobe's reflection of everything but what emits; and, weighed against [`direct`], of what emits
+    /// where the ray ends.
+    fn lobe_ray(&self, vertex: &Vertex, wo: DVec3, u: [f64; 2]) -> (Rgb, Rgb) {
         let scene = self.scene;
         let nothing = (Rgb::BLACK, Rgb::BLACK);
-        let n = self.lobe_normal(hit, patch, wo);
-        let above = |wi: &DVec3| scene.normal(patch).dot(*wi) > 0.0;
-        let Some(wi) = brdf.lobe_sample(n, wo, u).filter(above) else { return nothing };
-        let density = brdf.lobe_pdf(n, wo, wi);
-        let weight = brdf.lobe_eval(n, wi, wo) * (n.dot(wi) / density);
-        let point = scene.point_of(hit.triangle, hit.u, hit.v);
-        let Some(far) = scene.trace_from(patch, point, wi) else {
-            return (weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi)), Rgb::BLACK);
+        let Vertex { patch, point, normal: n, geometric, scatter, .. } = vertex;
+        let brdf = &scatter.brdf;
+        let above = |wi: &DVec3| geometric.dot(*wi) > 0.0;
+        let Some(wi) = brdf.lobe_sample(*n, wo, u).filter(above) else { return nothing };
+        let density = brdf.lobe_pdf(*n, wo, wi);
+        let weight = brdf.lobe_eval(*n, wi, wo) * (n.dot(wi) / density);
+        let balanced = |other: f64| density / (density + f64::from(LAMPS) * other);
+        let Some(far) = scene.trace_from(*patch, *point, wi) else {
+            let sky = weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi));
+            return match &self.lamps {
+                None => (sky, Rgb::BLACK),
+                Some(lamps) => (Rgb::BLACK, sky * balanced(lamps.sky_density(wi))),
+            };
         };
         let Some(there) = scene.patch_of(&far) else { return nothing };
         let met = self.lamps.as_ref().map_or(Rgb::BLACK, |lamps| {
             let emitted = scene.emission_at(far.triangle, far.side, far.u, far.v);
-            let other = lamps.density(point, there, scene.point_of(far.triangle, far.u, far.v));
-            weight * emitted * (density / (density + f64::from(LAMPS) * other))
+            let other = lamps.density(*point, there, scene.point_of(far.triangle, far.u, far.v));
+            weight * emitted * balanced(other)
         });
-        let brdf = scene.brdf_of(far.triangle, scene.color_at(far.triangle, far.u, far.v));
-        // What the far end reflects, its own lobe as if it were diffuse.
-        let light = self.reconstruction.smooth(there, &far).irradiance * brdf.mean_albedo() / PI;
+        // What the far end reflects, its own lobe as if it were diffuse, and mirrors too.
+        let scatter = scene.scatter_at(&far, Detail::Picture);
+        let mirrored = scatter.specular.map_or(Rgb::BLACK, |s| s.passed(0.5, false));
+        let light = self.reconstruction.smooth(there, &far).irradiance * (scatter.brdf.mean_albedo() + mirrored) / PI;
         (weight * light, met)
-    }
-
-    /// One sample of the lobe's reflection of emitting patches, by a ray to one of them; by the balance heuristic, the
-    /// other part being what rays into the lobe meet. Of several candidates one is chosen by what it would give, so that the
-    /// only ray goes where it matters.
-    fn lamp_in_lobe(
-        &self,
-        lamps: &Lights,
-        hit: &SurfaceHit,
-        patch: PatchId,
-        brdf: &Brdf,
-        wo: DVec3,
-        index: u64,
-    ) -> Rgb {
-        let scene = self.scene;
-        let point = scene.point_of(hit.triangle, hit.u, hit.v);
-        let (n, geometric) = (self.lobe_normal(hit, patch, wo), scene.normal(patch));
-        let mut random = Stream::new(0, 0x1A39, index);
-        let (mut sum, mut chosen) = (0.0, None);
-        for _ in 0..LAMPS {
-            let Some(light) = lamps.sample(point, &mut random) else { continue };
-            // The sky is left to the rays into the lobe.
-            let Some(end) = light.end else { continue };
-            let cosine = n.dot(light.towards);
-            if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 {
-                continue;
-            }
-            let density = f64::from(LAMPS) * light.density + brdf.lobe_pdf(n, wo, light.towards);
-            let gives = light.radiance * brdf.lobe_eval(n, light.towards, wo) * (cosine / density);
-            let luminance = gives.luminance();
-            if luminance > 0.0 {
-                sum += luminance;
-                if random.uniform() * sum < luminance {
-                    chosen = Some((gives / luminance, end));
-                }
-            }
-        }
-        match chosen {
-            Some((gives, (end, normal))) if scene.visible(point, geometric, end, normal) => gives * sum,
-            _ => Rgb::BLACK,
-        }
     }
 }
 

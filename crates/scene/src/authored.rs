@@ -96,6 +96,13 @@ impl Default for Material {
     }
 }
 
+impl Material {
+    /// True if both sides meet light: light that has entered a body also leaves it.
+    pub fn has_two_sides(&self) -> bool {
+        self.two_sided || self.transmission.is_some()
+    }
+}
+
 /// A colour that may vary over the surface: `factor` × texture.
 #[derive(Clone, Debug)]
 pub struct Texel {

@@ -48,7 +48,13 @@ impl PatchScene {
     /// The first surface that a ray from `point` on `patch` meets; the ray leaves on the patch's side.
     #[inline]
     pub fn trace_from(&self, patch: PatchId, point: DVec3, direction: DVec3) -> Option<SurfaceHit> {
-        let (own, normal) = (self.triangle_of(patch), self.normal(patch));
+        self.leave(self.triangle_of(patch), self.normal(patch), point, direction)
+    }
+
+    /// The first surface that a ray from `point` on the triangle `own` meets; `normal` is the triangle's, on the side to
+    /// which the ray leaves.
+    #[inline]
+    pub fn leave(&self, own: u32, normal: DVec3, point: DVec3, direction: DVec3) -> Option<SurfaceHit> {
         let origin = self.lifted(point, normal);
         let hit = self.closest(origin, direction, own)?;
         // How high above the patch's plane the hit is; only the lowest can be neighbours in that plane.
@@ -132,7 +138,7 @@ impl PatchScene {
     /// A point moved off its surface by a few units in the last place of single precision, in which the kernel
     /// works: far below a millimetre indoors. What this does not keep apart, `is_in_plane` does.
     #[inline]
-    fn lifted(&self, point: DVec3, normal: DVec3) -> DVec3 {
+    pub(crate) fn lifted(&self, point: DVec3, normal: DVec3) -> DVec3 {
         let scale = point.abs().max_element().max(1e-3 * self.radius());
         point + normal * (scale * LIFT)
     }

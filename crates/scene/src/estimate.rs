@@ -50,7 +50,7 @@ pub fn estimate(scene: &Scene, options: PatchOptions) -> Result<Estimate, PatchE
     let (mut outlines, mut materials) = (Vec::new(), Vec::new());
     place(scene, centre, &mut |placed| {
         let material = placed.mesh.material;
-        let sides = 1 + u32::from(scene.materials[material].two_sided || options.two_sided);
+        let sides = 1 + u32::from(scene.materials[material].has_two_sides() || options.two_sided);
         outlines.push((Outline::of(placed.corners()), sides));
         materials.push((material as u32, placed.mesh.texcoords.is_some()));
     });

@@ -10,9 +10,11 @@ pub mod environment;
 mod estimate;
 mod fingerprint;
 pub mod geom;
+pub mod passing;
 pub mod patch;
 pub mod rgb;
 pub mod sample;
+mod sight;
 pub mod texture;
 pub mod validate;
 

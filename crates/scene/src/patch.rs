@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::authored::{Material, Mesh, Opacity, Scene, Surface, TextureImage, TextureRef};
-use crate::brdf::{Brdf, Ggx, Phong};
+use crate::brdf::{Brdf, Detail, Ggx, Passing, Phong, Scatter, Specular};
 use crate::cells::{Cells, Outline};
 use crate::environment::EnvironmentLight;
 use crate::geom::area_vector_2;
@@ -93,6 +93,8 @@ pub(crate) struct Triangle {
     pub two_sided: bool,
     pub metallic: f32,
     pub roughness: f32,
+    /// Share of the base that transmits.
+    pub transmission: f32,
 }
 
 impl Triangle {
@@ -126,6 +128,10 @@ pub struct PatchScene {
     pub(crate) kernel: twinray_rays::Bvh,
     /// Whether any material has holes, which rays must ask about.
     pub(crate) holes: bool,
+    /// Whether rays of the solver go on at some surfaces.
+    passes: bool,
+    /// Whether shadow rays pass some surfaces.
+    panes: bool,
     pub(crate) environment: Option<EnvironmentLight>,
     /// Per patch: triangle × 2 + side.
     owner: Vec<u32>,
@@ -137,7 +143,6 @@ pub struct PatchScene {
     coverage: Vec<f32>,
     centre: DVec3,
     radius: f64,
-    passed: usize,
     degenerate: usize,
 }
 
@@ -147,8 +152,8 @@ const MAX_COORDINATE: f32 = 1e18;
 impl PatchScene {
     /// Cuts `scene` into patches and builds its ray kernel.
     ///
-    /// Transmissive surfaces are left out: light and sight pass straight through them. So are triangles without area
-    /// and those with a vertex that is not a number or beyond 1e18: [`PatchScene::degenerate_triangles`].
+    /// Triangles without area are left out, and those with a vertex that is not a number or beyond 1e18:
+    /// [`PatchScene::degenerate_triangles`]. What light passes has two sides.
     ///
     /// # Errors
     /// If there is no surface, or more patches than can be numbered.
@@ -168,9 +173,10 @@ impl PatchScene {
                 cell_area: 0.5 * across.length(),
                 first_patch: 0,
                 material: mesh.material as u32,
-                two_sided: scene.materials[mesh.material].two_sided || options.two_sided,
+                two_sided: scene.materials[mesh.material].has_two_sides() || options.two_sided,
                 metallic: 0.0,
                 roughness: 1.0,
+                transmission: 0.0,
             });
             attributes.push(Attributes {
                 normals: mesh.normals.as_ref().map(|n| {
@@ -199,6 +205,8 @@ impl PatchScene {
             images: scene.images.clone(),
             kernel: twinray_rays::Bvh::build(&kernel_input),
             holes: scene.materials.iter().any(|m| m.opacity != Opacity::Opaque),
+            passes: false,
+            panes: scene.materials.iter().any(|m| m.transmission.as_ref().is_some_and(|t| t.volume.is_none())),
             environment: scene.environment.clone().map(|e| EnvironmentLight::new(e, radius)),
             owner,
             base_color: Vec::new(),
@@ -206,8 +214,7 @@ impl PatchScene {
             coverage: Vec::new(),
             centre,
             radius,
-            passed: left_out.passed,
-            degenerate: left_out.degenerate,
+            degenerate: left_out,
         };
         debug_assert_eq!(this.kernel.left_out(), 0, "a patch that no ray can meet");
         this.average_materials();
@@ -227,11 +234,6 @@ impl PatchScene {
     /// Number of triangles that rays can meet.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
-    }
-
-    /// Number of transmissive triangles that were left out.
-    pub fn transmissive_triangles(&self) -> usize {
-        self.passed
     }
 
     /// Number of triangles that were left out because, where they are placed, they have no area or no finite place.
@@ -386,35 +388,95 @@ impl PatchScene {
         !self.emission.is_empty()
     }
 
-    /// The BRDF of a patch, with its mean base colour.
+    /// What a patch does with light by its mean base colour, as the solver sees it.
+    #[inline]
+    pub fn scatter(&self, patch: PatchId) -> Scatter {
+        let color = Rgb::from_f32(self.base_color[patch.index()]);
+        let triangle = self.triangle_of(patch);
+        let t = &self.triangles[triangle as usize];
+        let material = &self.materials[t.material as usize];
+        // Most materials by far.
+        if let (Surface::Lambertian { .. }, None) = (&material.surface, &material.transmission) {
+            return Scatter { brdf: Brdf::Lambertian { reflectance: color }, specular: None };
+        }
+        self.scatter_of(triangle, color, f64::from(t.metallic), f64::from(t.roughness), t.transmission, Detail::Patches)
+    }
+
+    /// The BRDF of a patch, as the solver sees it.
     #[inline]
     pub fn brdf(&self, patch: PatchId) -> Brdf {
-        let color = Rgb::from_f32(self.base_color[patch.index()]);
-        self.brdf_of(self.triangle_of(patch), color)
+        self.scatter(patch).brdf
     }
 
-    /// The BRDF of a triangle's material with a given base colour.
-    pub fn brdf_of(&self, triangle: u32, color: Rgb) -> Brdf {
+    /// What goes on sharply at a patch: mirrored or transmitted.
+    #[inline]
+    pub fn specular(&self, patch: PatchId) -> Option<Specular> {
+        if self.passes { self.scatter(patch).specular } else { None }
+    }
+
+    /// Scattering by a triangle's material, of what may vary over it: base colour, metalness, perceptual roughness and
+    /// share of the base that transmits.
+    pub fn scatter_of(
+        &self,
+        triangle: u32,
+        color: Rgb,
+        metallic: f64,
+        roughness: f64,
+        transmission: f32,
+        detail: Detail,
+    ) -> Scatter {
         let t = &self.triangles[triangle as usize];
-        match &self.materials[t.material as usize].surface {
-            Surface::Lambertian { .. } => Brdf::Lambertian { reflectance: color },
-            Surface::MetallicRoughness { specular, specular_color, ior, .. } => Brdf::Ggx(Ggx::new(
-                color,
-                f64::from(t.metallic),
-                f64::from(t.roughness),
-                *specular,
-                *specular_color,
-                *ior,
-            )),
-            Surface::Phong { specular, exponent, .. } => Brdf::Phong(Phong::new(color, *specular, *exponent)),
-        }
+        let material = &self.materials[t.material as usize];
+        let (brdf, ior, metallic) = match &material.surface {
+            Surface::Lambertian { .. } => (Brdf::Lambertian { reflectance: color }, 1.5, 0.0),
+            Surface::MetallicRoughness { specular, specular_color, ior, .. } => {
+                let ggx = Ggx::new(color, metallic, roughness, *specular, *specular_color, *ior);
+                (Brdf::Ggx(ggx), *ior, metallic)
+            }
+            Surface::Phong { specular, exponent, .. } => {
+                (Brdf::Phong(Phong::new(color, *specular, *exponent)), 1.5, 0.0)
+            }
+        };
+        let passing = material.transmission.as_ref().map(|x| Passing {
+            share: f64::from(transmission) * (1.0 - metallic),
+            color,
+            ior,
+            volume: x.volume,
+        });
+        Scatter::new(brdf, passing, detail)
     }
 
-    /// True if the patch has a lobe beside its base.
+    /// What a surface does with light at a point: its base colour at full resolution.
+    pub fn scatter_at(&self, hit: &crate::SurfaceHit, detail: Detail) -> Scatter {
+        let t = &self.triangles[hit.triangle as usize];
+        let color = self.color_at(hit.triangle, hit.u, hit.v);
+        self.scatter_of(
+            hit.triangle,
+            color,
+            f64::from(t.metallic),
+            f64::from(t.roughness),
+            t.transmission,
+            detail,
+        )
+    }
+
+    /// True if the patch has what a single number does not tell of it: a lobe, or a base under a coat.
     #[inline]
     pub fn is_glossy(&self, patch: PatchId) -> bool {
         let t = &self.triangles[self.triangle_of(patch) as usize];
         !matches!(self.materials[t.material as usize].surface, Surface::Lambertian { .. })
+    }
+
+    /// True if a straight line of sight may pass some panes.
+    #[inline]
+    pub fn has_panes(&self) -> bool {
+        self.panes
+    }
+
+    /// True if rays of the solver go on at some surfaces: mirrors, glass.
+    #[inline]
+    pub fn has_specular(&self) -> bool {
+        self.passes
     }
 
     /// The material of a patch.
@@ -505,7 +567,7 @@ impl PatchScene {
         let holes = self.holes;
         let emits = self.materials.iter().any(|m| !m.emission.is_black());
         for (t, means) in self.triangles.iter_mut().zip(means) {
-            (t.metallic, t.roughness) = (means.metallic, means.roughness);
+            (t.metallic, t.roughness, t.transmission) = (means.metallic, means.roughness, means.transmission);
             let count = t.cells.count() as usize;
             for side in 0..sides(t) {
                 let cell = |values: &[[f32; 3]], k: usize| values[if values.len() == 1 { 0 } else { k }];
@@ -523,6 +585,7 @@ impl PatchScene {
         if self.emission.iter().all(|e| *e == [0.0; 3]) {
             self.emission = Vec::new();
         }
+        self.passes = self.patches().any(|p| self.scatter(p).specular.is_some());
     }
 
     /// Means over a triangle's cells; `texels` are those of the largest picture.
@@ -544,6 +607,7 @@ impl PatchScene {
             coverage: vec![1.0],
             metallic: metallic as f32,
             roughness: roughness as f32,
+            transmission: material.transmission.as_ref().map_or(0.0, |x| x.factor) as f32,
         };
         if has_uv && mr_texture.is_some() {
             let whole = Cells::Regular { m: 1 };
@@ -603,6 +667,7 @@ pub(crate) struct TriangleMeans {
     coverage: Vec<f32>,
     metallic: f32,
     roughness: f32,
+    transmission: f32,
 }
 
 pub(crate) fn base_texel(surface: &Surface) -> &crate::authored::Texel {
@@ -661,22 +726,11 @@ impl Placed<'_> {
     }
 }
 
-/// Triangles that are not placed.
-#[derive(Default)]
-pub(crate) struct LeftOut {
-    passed: usize,
-    degenerate: usize,
-}
-
-/// Calls `each` with every triangle that a ray can meet, in order.
-pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) -> LeftOut {
-    let mut left_out = LeftOut::default();
+/// Calls `each` with every triangle that a ray can meet, in order; returns the number of those left out.
+pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) -> usize {
+    let mut left_out = 0;
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh];
-        if scene.materials[mesh.material].transmission.is_some() {
-            left_out.passed += mesh.triangles.len();
-            continue;
-        }
         let place = instance.transform;
         // Mirrored instances keep their front side outside: the winding follows the determinant (glTF 2.0, 3.5.2).
         let mirrored = place.matrix3.determinant() < 0.0;
@@ -690,7 +744,7 @@ pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) 
             let across = area_vector_2(a, b, c);
             let in_range = vertices.iter().flatten().all(|x| x.abs() <= MAX_COORDINATE);
             if !(in_range && across.length() > 0.0) {
-                left_out.degenerate += 1;
+                left_out += 1;
                 continue;
             }
             each(Placed { mesh, corner, vertices, across, normal_matrix });

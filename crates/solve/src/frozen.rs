@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 use twinray_scene::geom::Frame;
+use twinray_scene::passing;
 use twinray_scene::sample::warp;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
@@ -140,7 +141,8 @@ impl<'a> Frozen<'a> {
             Some(e) if c.environment > 0.0 => channel * e.power().luminance() / c.environment,
             _ => 0.0,
         };
-        if by_patches.is_finite() { by_patches.max(by_sky) } else { by_sky }
+        let largest = if by_patches.is_finite() { by_patches.max(by_sky) } else { by_sky };
+        if self.start.scene.has_specular() { largest * passing::LARGEST_FACTOR } else { largest }
     }
 
     /// What a patch sends towards `wo`, and the density with which rays start there.

@@ -8,6 +8,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use twinray_scene::passing::End;
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
@@ -18,7 +19,7 @@ use crate::patch_radiance::{Directional, Outgoing, stand_in};
 use crate::record::{GlossyRecord, RecordError, SequentialRecord};
 use crate::representative::Representative;
 use crate::select::PowerTree;
-use crate::shoot::{Far, shoot};
+use crate::shoot::{Shot, shoot};
 use crate::solution::{GlossySolution, Solution};
 use crate::sums::cell;
 use crate::tally::Tally;
@@ -176,19 +177,22 @@ impl Sequential {
         let ([choice, _], place, direction) = (pair(), pair(), pair());
         let shooter = PatchId(self.tree.select(choice, self.n) as u32);
         let outgoing = self.outgoing(scene, glossy, params, shooter);
-        let Some((direction, far)) = shoot(scene, shooter, &outgoing, place, direction, || random.uniform()) else {
+        let Some(shot) = shoot(scene, shooter, &outgoing, place, direction, || random.uniform()) else {
             return;
         };
+        let Shot { direction, arrival, stop } = shot;
         let here = outgoing.endpoint(scene.normal(shooter), direction);
-        match far {
-            Far::Patch(hit) => {
-                let there = self.outgoing(scene, glossy, params, hit).endpoint(scene.normal(hit), -direction);
-                let d = transfer(params.estimator, &here, &there);
-                self.pending.push(Pending { patch: hit, deposit: d.on_hit, wi: -direction, end: 2 * index });
-                self.pending.push(Pending { patch: shooter, deposit: d.on_shooter, wi: direction, end: 2 * index + 1 });
+        match arrival.end {
+            End::Patch(hit) => {
+                let away = -arrival.direction;
+                let there = self.outgoing(scene, glossy, params, hit).endpoint(scene.normal(hit), away);
+                let d = transfer(params.estimator, &here.stopping(arrival.stop), &there.stopping(stop));
+                let [on_hit, on_shooter] = [d.on_hit, d.on_shooter].map(|d| d * arrival.factor);
+                self.pending.push(Pending { patch: hit, deposit: on_hit, wi: away, end: 2 * index });
+                self.pending.push(Pending { patch: shooter, deposit: on_shooter, wi: direction, end: 2 * index + 1 });
             }
-            Far::Back => self.tally.lost += here.radiance / here.density,
-            Far::Sky => self.tally.escaped += here.radiance / here.density,
+            End::Back | End::Lost => self.tally.lost += here.radiance * arrival.factor / here.density,
+            End::Sky => self.tally.escaped += here.radiance * arrival.factor / here.density,
         }
     }
 
@@ -218,7 +222,7 @@ impl Sequential {
         let irradiance = p.deposit / area;
         let albedo = brdf.albedo(n.dot(p.wi));
         self.tally.arrived += p.deposit;
-        self.tally.absorbed += p.deposit * (Rgb::WHITE - albedo);
+        self.tally.absorbed += p.deposit * (Rgb::WHITE - albedo - scene.passed_share(p.patch, p.wi));
         let state = &mut self.patches[p.patch.index()];
         state.evidence.squares += p.deposit.luminance().powi(2);
         state.evidence.hits = state.evidence.hits.saturating_add(1);

@@ -18,6 +18,14 @@ pub struct Endpoint {
     pub density: f64,
 }
 
+impl Endpoint {
+    /// The same where a ray that starts here stops at its far end with probability `stop`, and might have gone on.
+    #[inline]
+    pub fn stopping(self, stop: f64) -> Self {
+        Self { density: self.density * stop, ..self }
+    }
+}
+
 /// Deposits on both ends of one ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Deposits {

@@ -200,7 +200,7 @@ impl Waves {
         let closed = wave.close(&context, &closing, &mut self.source, &mut [], output);
         (around.lap)(Stage::Deposit);
         tally.arrived = closed.arrived;
-        tally.absorbed = closed.arrived - closed.reflected;
+        tally.absorbed += closed.arrived - closed.reflected;
         self.tally.add_weighted(&tally, 1.0);
         self.output_weight += size as f64;
         self.n += size;
@@ -348,7 +348,7 @@ impl Waves {
             let closed = wave.close(&context, &closing, &mut self.source, &mut unshot, output);
             (around.lap)(Stage::Deposit);
             tally.arrived = closed.arrived;
-            tally.absorbed = closed.arrived - closed.reflected;
+            tally.absorbed += closed.arrived - closed.reflected;
             self.tally.add_weighted(&tally, closing.output);
             if step == 0 {
                 first = power;

@@ -44,7 +44,6 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
         let report = json!({
             "scene": loaded.name,
             "triangles": patches.triangle_count(),
-            "transmissive_triangles_left_out": patches.transmissive_triangles(),
             "patches": patches.len(), "glossy_patches": glossy, "emitting_patches": patches.emitter_count(),
             "area": patches.total_area(), "size": size.to_array(),
             "emitted_power_rgb": power.to_array(), "mean_albedo_rgb": albedo.to_array(),
@@ -63,9 +62,6 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
     let mb = |bytes: usize| format!("{:.1} MB", bytes as f64 * 1e-6);
     println!("scene      {}", loaded.name);
     println!("triangles  {}", patches.triangle_count());
-    if patches.transmissive_triangles() > 0 {
-        println!("           {} transmissive ones left out", patches.transmissive_triangles());
-    }
     println!("patches    {} ({glossy} glossy, {} emitting)", patches.len(), patches.emitter_count());
     println!("size       {:.4} x {:.4} x {:.4} m, area {:.4} m²", size.x, size.y, size.z, patches.total_area());
     println!("emission   {:.6} {:.6} {:.6} W (R G B), Σ π A L", power.r, power.g, power.b);

@@ -6,6 +6,7 @@ mod compare_solutions;
 pub mod export;
 pub mod info;
 pub mod merge;
+mod gather;
 mod path;
 pub mod reference;
 pub mod render;

@@ -26,10 +26,11 @@ pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
         (args.solve.rays.is_some(), "--rays"),
         (args.solve.preset == Some(Preset::Paper), "--preset paper"),
         (args.flat, "--flat"),
+        (args.lobes.is_some(), "--lobes"),
     ];
     match solver.iter().find(|(given, _)| *given) {
         Some((_, option)) => {
-            bail!("{option} is for --method patches; with --method path, expected --samples, --time or --error")
+            bail!("{option} is for solves; with --method path, expected --samples, --time or --error")
         }
         None => Ok(()),
     }

@@ -11,11 +11,12 @@ use twinray::scene::Camera;
 use twinray::solve::{Observer, Solution};
 
 use crate::args::{ExposureArg, LobesArg, MethodArg, RenderArgs, ToneArg};
-use crate::commands::{path, solving};
+use crate::commands::{gather, path, solving};
 use crate::estimate::{PictureWork, Work};
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
 use crate::output::{Output, extension};
+use crate::progress::Goal;
 use crate::settings::Settings;
 use crate::{commands, interrupt, stored};
 
@@ -30,8 +31,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     if !matches!(extension(&path).as_str(), "png" | "exr") {
         bail!("{}: expected a name that ends in .png or .exr", path.display());
     }
-    if args.path.method == MethodArg::Path {
-        path::check(args)?;
+    let method = args.method();
+    match method {
+        MethodArg::Path => path::check(args)?,
+        MethodArg::Gather => gather::check(args)?,
+        MethodArg::Patches => {}
     }
     commands::set_threads(args.load.threads);
     interrupt::install();
@@ -46,17 +50,20 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     }
     let loading = start.elapsed().as_secs_f64();
 
-    if args.path.method == MethodArg::Path {
-        return path::run(args, &loaded, camera, output, loading);
+    match method {
+        MethodArg::Path => return path::run(args, &loaded, camera, output, loading),
+        MethodArg::Gather => return gather::run(args, &loaded, camera, output, loading),
+        MethodArg::Patches => {}
     }
-    let Light { solution, settings, seconds, rate, interrupted } = light(args, &loaded, camera)?;
+    let goal = solving::goal(&args.solve, loaded.patches.len(), None);
+    let Light { solution, settings, seconds, rate, interrupted } = light(args, &loaded, Some(camera), goal)?;
 
     let start = Instant::now();
     let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
     let lobes = match args.lobes {
-        LobesArg::Traced => Lobes::Traced,
-        LobesArg::Patches => Lobes::Patches,
+        None | Some(LobesArg::Traced) => Lobes::Traced,
+        Some(LobesArg::Patches) => Lobes::Patches,
     };
     let options = PictureOptions { width, height, samples, flat: args.flat, lobes };
     if !solution.is_observed() && (args.flat || matches!(lobes, Lobes::Patches)) {
@@ -111,30 +118,32 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
 }
 
 /// The light that the picture is taken of.
-struct Light {
-    solution: Solution,
-    settings: Settings,
+pub(super) struct Light {
+    pub solution: Solution,
+    pub settings: Settings,
     /// Seconds that it took here, and rays per second.
-    seconds: f64,
-    rate: f64,
-    interrupted: bool,
+    pub seconds: f64,
+    pub rate: f64,
+    pub interrupted: bool,
 }
 
-/// Solves the scene, or takes the light of the solution file that stands for it.
-fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<Light> {
+/// Solves the scene, or takes the light of the solution file that stands for it. A camera is told to the solver where its
+/// picture is to be of what patches remember.
+pub(super) fn light(args: &RenderArgs, loaded: &Loaded, camera: Option<&Camera>, goal: Goal) -> anyhow::Result<Light> {
     let name = &args.load.scene;
     let Some(stored) = &loaded.stored else {
         let settings = Settings::new(&args.solve, None);
-        let goal = solving::goal(&args.solve, loaded.patches.len(), None);
-        let observer = Observer::new(&loaded.patches, camera);
-        let start = solving::Start { settings: &settings, stored: None, observer: Some(observer), peers: None };
+        let observer = camera.map(|camera| Observer::new(&loaded.patches, camera));
+        let start = solving::Start { settings: &settings, stored: None, observer, peers: None };
         let solved = solving::solve(start, goal, name, loaded, args.load.quiet, |_, _| ())?;
         let (seconds, rate, interrupted) = (solved.seconds, solved.rate(), solved.interrupted);
         return Ok(Light { solution: solved.solver.solution(), settings, seconds, rate, interrupted });
     };
-    if args.solve.rays.is_some() || args.solve.time.is_some() || args.solve.error.is_some() {
+    let is_gather = args.method() == MethodArg::Gather;
+    if args.solve.rays.is_some() || (!is_gather && (args.solve.time.is_some() || args.solve.error.is_some())) {
+        let those = if is_gather { "--rays is" } else { "--rays, --time and --error are" };
         bail!(
-            "{name}: is solved already, so --rays, --time and --error are not for it: `twinray solve {name}` makes it better, and pictures then take what is there"
+            "{name}: is solved already, so {those} not for it: `twinray solve {name}` makes it better, and pictures then take what is there"
         );
     }
     let start = Instant::now();
@@ -150,7 +159,7 @@ fn light(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<
 
 /// What is to be done, for the estimate.
 fn work(args: &RenderArgs) -> Work {
-    let is_traced = args.path.method == MethodArg::Path;
+    let is_traced = args.method() == MethodArg::Path;
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
     let solve = if is_traced || stored::is_solution(&args.load.scene) {
         Work::default()

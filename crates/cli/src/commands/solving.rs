@@ -72,7 +72,7 @@ pub fn solve<'a>(
     // Its room on the disk is free once it is replaced.
     drop(stored);
     progress = progress.after(before);
-    let limit = if let Goal::Rays(n) = goal { n } else { u64::MAX };
+    let limit = if let Goal::Rays(n) | Goal::First(n, _) = goal { n } else { u64::MAX };
     // Clocks and signals may say other things elsewhere: nobody stops alone.
     let any = |yes: bool| peers.map_or(yes, |p| p.any(yes));
     // The warm start alone is too coarse to be judged or kept: at least one wave is shot.
@@ -101,6 +101,11 @@ pub fn work(args: &SolveArgs, part: Option<[u32; 2]>) -> Work {
         _ => Rays::Unknown,
     };
     Work { solve: Some((Settings::new(args, part).params(), rays)), ..Work::default() }
+}
+
+/// Rays where the user does not say.
+pub fn default_rays(patches: usize) -> u64 {
+    DEFAULT_RAYS_PER_PATCH * patches as u64
 }
 
 /// How far to go: as the user says, or some rays per patch. A part of several shoots its share of the rays, and leaves its share

@@ -6,12 +6,13 @@
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
-use twinray_scene::brdf::Brdf;
+use twinray_scene::brdf::{Brdf, Scatter};
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 use twinray_solve::PatchLight;
 
-use super::path::{PathTracer, Technique, Vertex};
+use super::path::{PathTracer, Technique};
+use crate::vertex::Vertex;
 
 /// Purpose of the streams of random numbers.
 const PATCHES: u64 = 0x9A7B_0002;
@@ -115,5 +116,6 @@ fn arriving(tracer: &PathTracer, patch: PatchId, random: &mut Stream) -> Rgb {
     let normal = scene.normal(patch);
     let point = scene.point_of(scene.triangle_of(patch), u, v);
     let white = Brdf::Lambertian { reflectance: Rgb::WHITE };
-    tracer.reflected(Vertex { patch, point, normal, brdf: white }, normal, random) * PI
+    let scatter = Scatter { brdf: white, specular: None };
+    tracer.follow(Vertex { patch, point, geometric: normal, normal, scatter, inside: false }, normal, random).reflected * PI
 }

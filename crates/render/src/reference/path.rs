@@ -2,14 +2,17 @@
 //!
 //! Light that arrives straight from what emits is found in two ways, by a shadow ray and by the path itself, weighed
 //! by the balance heuristic (E. Veach and L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
-//! rendering", SIGGRAPH 1995). Normals are geometric, as in the solver's transport. One-sided backs absorb.
+//! rendering", SIGGRAPH 1995). Behind mirrors and bodies of glass the path alone finds it; clear panes are no
+//! obstacle to shadow rays. Normals are geometric, as in the solver's transport, but for what a camera sees. One-sided
+//! backs absorb.
 
 use glam::DVec3;
-use twinray_scene::brdf::Brdf;
+use twinray_scene::brdf::attenuated;
 use twinray_scene::sample::Stream;
-use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
+use twinray_scene::{PatchScene, Rgb};
 
 use crate::lights::Lights;
+use crate::vertex::{Look, Step, Vertex};
 
 /// How light straight from what emits is found. All three have the same mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,26 +45,6 @@ const SURE_BOUNCES: u32 = 3;
 /// bring albedos to .98 at most, so this limit is not met there.
 const MOST_SURVIVAL: f64 = 0.999;
 
-/// A point of a surface that scatters.
-pub(super) struct Vertex {
-    pub patch: PatchId,
-    pub point: DVec3,
-    pub normal: DVec3,
-    pub brdf: Brdf,
-}
-
-impl Vertex {
-    /// The vertex where a ray met `patch`: its material at the very point.
-    pub fn of_hit(scene: &PatchScene, hit: &SurfaceHit, patch: PatchId) -> Self {
-        Self {
-            patch,
-            point: scene.point_of(hit.triangle, hit.u, hit.v),
-            normal: scene.normal(patch),
-            brdf: scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v)),
-        }
-    }
-}
-
 /// Follows paths through a scene.
 pub(super) struct PathTracer<'a> {
     pub scene: &'a PatchScene,
@@ -69,39 +52,79 @@ pub(super) struct PathTracer<'a> {
     technique: Technique,
 }
 
+/// What a path brought.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    /// What emits and was seen in mirrors and through glass.
+    pub seen: Rgb,
+    /// What was reflected on the way.
+    pub reflected: Rgb,
+}
+
 impl<'a> PathTracer<'a> {
     pub fn new(scene: &'a PatchScene, technique: Technique) -> Self {
         Self { scene, lights: Lights::new(scene), technique }
     }
 
-    /// One unbiased sample of the radiance that `vertex` reflects towards `wo`, after any number of bounces.
-    pub fn reflected(&self, mut vertex: Vertex, mut wo: DVec3, random: &mut Stream) -> Rgb {
-        let (mut radiance, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
+    /// One unbiased sample of the radiance that `vertex` sends towards `wo` beside what it emits itself, after any number
+    /// of bounces.
+    pub fn follow(&self, mut vertex: Vertex, mut wo: DVec3, random: &mut Stream) -> Found {
+        let scene = self.scene;
+        let (mut found, mut throughput) = (Found::default(), Rgb::WHITE);
+        // The last point that scattered, and the density of the direction from there.
+        let mut scattered: Option<(DVec3, f64)> = None;
+        // Whether a shadow ray from there may have found what is met next.
+        let mut lit = false;
+        let mut look = Look::Display;
         for bounce in 1u32.. {
-            radiance += throughput * self.shadow_ray(&vertex, wo, random);
-            let Vertex { patch, point, normal, brdf } = &vertex;
-            let Some(wi) = brdf.sample(*normal, wo, [random.uniform(), random.uniform()]) else { break };
-            let (cosine, density) = (normal.dot(wi), brdf.pdf(*normal, wo, wi));
-            if !(cosine > 0.0 && density > 0.0) {
-                break;
-            }
-            throughput = throughput * brdf.eval(*normal, wi, wo) * (cosine / density);
+            let (direction, side, medium) =
+                match vertex.step(wo, random.uniform(), || [random.uniform(), random.uniform()]) {
+                    Step::End => break,
+                    Step::On(way) => {
+                        throughput = throughput * way.factor;
+                        lit &= way.straight;
+                        (way.direction, way.side, way.medium)
+                    }
+                    Step::Scatter(factor) => {
+                        throughput *= factor;
+                        found.reflected += throughput * self.shadow_ray(&vertex, wo, random);
+                        let Vertex { point, geometric, normal, scatter, .. } = &vertex;
+                        let u = [random.uniform(), random.uniform()];
+                        let Some(wi) = scatter.brdf.sample(*normal, wo, u) else { break };
+                        let (cosine, density) = (normal.dot(wi), scatter.brdf.pdf(*normal, wo, wi));
+                        if !(cosine > 0.0 && density > 0.0 && geometric.dot(wi) > 0.0) {
+                            break;
+                        }
+                        throughput = throughput * scatter.brdf.eval(*normal, wi, wo) * (cosine / density);
+                        (scattered, lit, look) = (Some((*point, density)), true, Look::Plain);
+                        (wi, *geometric, None)
+                    }
+                };
             if throughput.is_black() {
                 break;
             }
-            let Some(hit) = self.scene.trace_from(*patch, *point, wi) else {
-                if let Some(sky) = self.scene.environment() {
-                    let [_, weight] = self.technique.weights(self.lights.sky_density(wi), density);
-                    radiance += throughput * sky.radiance(wi) * weight;
+            let weight = |light: &dyn Fn(DVec3) -> f64| match scattered {
+                Some((point, density)) if lit => self.technique.weights(light(point), density)[1],
+                // Whoever looks through shadow rays alone would miss what only paths find.
+                _ => 1.0,
+            };
+            let triangle = scene.triangle_of(vertex.patch);
+            let Some(hit) = scene.leave(triangle, side, vertex.point, direction) else {
+                if let Some(sky) = scene.environment() {
+                    let light = throughput * sky.radiance(direction) * weight(&|_| self.lights.sky_density(direction));
+                    found.add(light, scattered.is_none());
                 }
                 break;
             };
-            let Some(there) = self.scene.patch_of(&hit) else { break };
-            let next = Vertex::of_hit(self.scene, &hit, there);
-            let emitted = self.scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
+            let Some(there) = scene.patch_of(&hit) else { break };
+            if let Some(coefficient) = scene.medium_before(&hit, medium) {
+                throughput = throughput * attenuated(coefficient, hit.t);
+            }
+            let next = Vertex::new(scene, &hit, there, -direction, look);
+            let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
             if !emitted.is_black() {
-                let [_, weight] = self.technique.weights(self.lights.density(*point, there, next.point), density);
-                radiance += throughput * emitted * weight;
+                let light = throughput * emitted * weight(&|point| self.lights.density(point, there, next.point));
+                found.add(light, scattered.is_none());
             }
             if bounce >= SURE_BOUNCES {
                 let survival = throughput.max_channel().min(MOST_SURVIVAL);
@@ -110,9 +133,9 @@ impl<'a> PathTracer<'a> {
                 }
                 throughput *= 1.0 / survival;
             }
-            (vertex, wo) = (next, -wi);
+            (vertex, wo) = (next, -direction);
         }
-        radiance
+        found
     }
 
     /// What one shadow ray says of the light that comes straight from an emitter or the sky.
@@ -120,20 +143,27 @@ impl<'a> PathTracer<'a> {
         if self.technique == Technique::Path {
             return Rgb::BLACK;
         }
-        let Vertex { patch, point, normal, brdf } = vertex;
-        let Some(light) = self.lights.sample(*point, random) else { return Rgb::BLACK };
+        let Vertex { patch, point, geometric, normal, scatter, .. } = vertex;
+        let [choice, s, t] = std::array::from_fn(|_| random.uniform());
+        let Some(light) = self.lights.sample(*point, choice, [s, t]) else { return Rgb::BLACK };
         let cosine = normal.dot(light.towards);
-        if cosine <= 0.0 || light.radiance.is_black() {
+        if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 || light.radiance.is_black() {
             return Rgb::BLACK;
         }
-        let free = match light.end {
-            Some((end, normal_there)) => self.scene.visible(*point, *normal, end, normal_there),
-            None => self.scene.trace_from(*patch, *point, light.towards).is_none(),
+        let passed = match light.end {
+            Some((end, normal_there)) => self.scene.transmittance(*point, *geometric, end, normal_there),
+            None => self.scene.transmittance_from_sky(*patch, *point, light.towards),
         };
-        if !free {
+        if passed.is_black() {
             return Rgb::BLACK;
         }
-        let [weight, _] = self.technique.weights(light.density, brdf.pdf(*normal, wo, light.towards));
-        light.radiance * brdf.eval(*normal, light.towards, wo) * (cosine * weight / light.density)
+        let [weight, _] = self.technique.weights(light.density, scatter.brdf.pdf(*normal, wo, light.towards));
+        light.radiance * passed * scatter.brdf.eval(*normal, light.towards, wo) * (cosine * weight / light.density)
+    }
+}
+
+impl Found {
+    fn add(&mut self, light: Rgb, seen: bool) {
+        *(if seen { &mut self.seen } else { &mut self.reflected }) += light;
     }
 }

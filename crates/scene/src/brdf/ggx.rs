@@ -27,11 +27,13 @@ pub struct Ggx {
     coat0: f64,
     coat90: f64,
     alpha: f64,
+    /// The lobe is a mirror's, and not here: [`super::Specular`].
+    is_sharp: bool,
 }
 
 impl Ggx {
     /// From glTF parameters: base colour, metalness, perceptual roughness, `KHR_materials_specular` factor and
-    /// colour, index of refraction. Roughness is limited by [`super::MIN_ALPHA`].
+    /// colour, index of refraction.
     pub fn new(base_color: Rgb, metallic: f64, roughness: f64, specular: f64, specular_color: Rgb, ior: f64) -> Self {
         let metallic = metallic.clamp(0.0, 1.0);
         let normal_incidence = ((ior - 1.0) / (ior + 1.0)).powi(2);
@@ -42,33 +44,85 @@ impl Ggx {
             f90: specular + (1.0 - specular) * metallic,
             coat0: coat.max_channel(),
             coat90: specular,
-            alpha: (roughness * roughness).clamp(super::MIN_ALPHA, 1.0),
+            alpha: (roughness * roughness).clamp(1e-4, 1.0),
+            is_sharp: false,
         }
+    }
+
+    /// The same without its lobe, which is a mirror's.
+    pub fn sharp(self) -> Self {
+        Self { is_sharp: true, ..self }
+    }
+
+    /// The same with a lobe that is at least so wide.
+    pub fn at_least(self, alpha: f64) -> Self {
+        Self { alpha: self.alpha.max(alpha), ..self }
+    }
+
+    /// The same with a part of the base that does not scatter.
+    pub fn without(self, transmitted: f64) -> Self {
+        Self { diffuse: self.diffuse * (1.0 - transmitted), ..self }
+    }
+
+    /// α, the square of the perceptual roughness.
+    pub fn alpha(&self) -> f64 {
+        self.alpha
+    }
+
+    /// True if the lobe is a mirror's.
+    pub fn is_sharp(&self) -> bool {
+        self.is_sharp
+    }
+
+    /// Reflectance of the lobe at normal and at grazing incidence.
+    pub fn fresnel(&self) -> [Rgb; 2] {
+        [self.f0, Rgb::grey(self.f90)]
+    }
+
+    /// Directional albedo of the coat: what its base does not get.
+    pub fn coat_albedo(&self, cosine: f64) -> f64 {
+        let (scale, bias) = self.split_sum(cosine);
+        self.coat0 * scale + self.coat90 * bias
+    }
+
+    /// Factors on the reflectance at normal and at grazing incidence.
+    fn split_sum(&self, cosine: f64) -> (f64, f64) {
+        if self.is_sharp {
+            let fresnel = schlick(cosine);
+            return (1.0 - fresnel, fresnel);
+        }
+        let t = table::ggx();
+        (t.scale.at(cosine, self.alpha), t.bias.at(cosine, self.alpha))
     }
 
     /// The base's part of f_r for two cosines.
     pub(super) fn base(&self, ci: f64, co: f64) -> Rgb {
-        let t = table::ggx();
-        let coat = |c| self.coat0 * t.scale.at(c, self.alpha) + self.coat90 * t.bias.at(c, self.alpha);
+        let coat = |c| self.coat_albedo(c);
         self.diffuse * ((1.0 - coat(ci)) * (1.0 - coat(co)) / (PI * (1.0 - self.mean_coat())))
     }
 
     /// Cosine-weighted mean of the coat's albedo, Ē.
     fn mean_coat(&self) -> f64 {
+        if self.is_sharp {
+            // ∫ 2c (1 − c)⁵ dc = 1/21.
+            return self.coat0 + (self.coat90 - self.coat0) / 21.0;
+        }
         let t = table::ggx();
         self.coat0 * t.mean_scale.at(0.0, self.alpha) + self.coat90 * t.mean_bias.at(0.0, self.alpha)
     }
 
     pub(super) fn albedo(&self, cosine: f64) -> Rgb {
-        let t = table::ggx();
-        let (scale, bias) = (t.scale.at(cosine, self.alpha), t.bias.at(cosine, self.alpha));
-        let coat = self.coat0 * scale + self.coat90 * bias;
-        self.f0 * scale + Rgb::grey(self.f90 * bias) + self.diffuse * (1.0 - coat)
+        let (scale, bias) = self.split_sum(cosine);
+        let lobe = if self.is_sharp { Rgb::BLACK } else { self.f0 * scale + Rgb::grey(self.f90 * bias) };
+        lobe + self.diffuse * (1.0 - self.coat0 * scale - self.coat90 * bias)
     }
 
     pub(super) fn lobe_albedo(&self, cosine: f64) -> Rgb {
-        let t = table::ggx();
-        self.f0 * t.scale.at(cosine, self.alpha) + Rgb::grey(self.f90 * t.bias.at(cosine, self.alpha))
+        if self.is_sharp {
+            return Rgb::BLACK;
+        }
+        let (scale, bias) = self.split_sum(cosine);
+        self.f0 * scale + Rgb::grey(self.f90 * bias)
     }
 
     pub(super) fn lobe(&self, n: DVec3, wi: DVec3, wo: DVec3) -> Rgb {

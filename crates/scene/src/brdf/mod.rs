@@ -7,6 +7,8 @@
 
 mod ggx;
 mod phong;
+mod scatter;
+mod specular;
 mod table;
 
 use std::f64::consts::PI;
@@ -18,10 +20,12 @@ use crate::sample::warp;
 
 pub use ggx::Ggx;
 pub use phong::Phong;
+pub use scatter::{Detail, Passing, Scatter};
+pub use specular::{Choices, Event, Specular, attenuated, mirrored};
 
-/// Directions in the solid angle of a lobe are never more peaked than this α (roughness 0.2): a patch stores
-/// light by its area, and a lobe sharper than its neighbours are far apart would show as single bright cells.
-/// Such surfaces have to be treated as mirrors; until then they are blurred to this and the user is told.
+/// Lobes on patches are never more peaked than this α (roughness 0.2): a patch stores light by its area, and a lobe
+/// sharper than its neighbours are far apart would show as single bright cells. Lobes below half of this roughness
+/// are mirrors for the solver's rays, those between are blurred to this. Pictures show them as they are.
 pub const MIN_ALPHA: f64 = 0.04;
 
 /// A bidirectional reflectance distribution function.
@@ -47,8 +51,8 @@ impl Brdf {
         }
         match self {
             Brdf::Lambertian { reflectance } => *reflectance / PI,
-            Brdf::Ggx(g) => g.base(ci, co) + g.lobe(n, wi, wo),
-            Brdf::Phong(p) => p.diffuse / PI + p.lobe(n, wi, wo),
+            Brdf::Ggx(g) => g.base(ci, co) + self.lobe_eval(n, wi, wo),
+            Brdf::Phong(p) => p.diffuse / PI + self.lobe_eval(n, wi, wo),
         }
     }
 
@@ -81,12 +85,16 @@ impl Brdf {
 
     /// True if there is a lobe beside the base.
     pub fn is_glossy(&self) -> bool {
-        !matches!(self, Brdf::Lambertian { .. })
+        match self {
+            Brdf::Lambertian { .. } => false,
+            Brdf::Ggx(g) => !g.is_sharp(),
+            Brdf::Phong(p) => !p.is_sharp(),
+        }
     }
 
     /// The lobe's part of f_r; black without a lobe.
     pub fn lobe_eval(&self, n: DVec3, wi: DVec3, wo: DVec3) -> Rgb {
-        if n.dot(wi) <= 0.0 || n.dot(wo) <= 0.0 {
+        if n.dot(wi) <= 0.0 || n.dot(wo) <= 0.0 || !self.is_glossy() {
             return Rgb::BLACK;
         }
         match self {
@@ -108,7 +116,7 @@ impl Brdf {
     /// A direction about proportional to the lobe × cosine, given the other direction; `None` where the choice
     /// falls below the horizon (the density then integrates to less than one) or without a lobe.
     pub fn lobe_sample(&self, n: DVec3, wi: DVec3, u: [f64; 2]) -> Option<DVec3> {
-        if n.dot(wi) <= 0.0 {
+        if n.dot(wi) <= 0.0 || !self.is_glossy() {
             return None;
         }
         let wo = match self {
@@ -121,7 +129,7 @@ impl Brdf {
 
     /// Density of [`Brdf::lobe_sample`] per solid angle of `wo`.
     pub fn lobe_pdf(&self, n: DVec3, wi: DVec3, wo: DVec3) -> f64 {
-        if n.dot(wi) <= 0.0 || n.dot(wo) <= 0.0 {
+        if n.dot(wi) <= 0.0 || n.dot(wo) <= 0.0 || !self.is_glossy() {
             return 0.0;
         }
         match self {

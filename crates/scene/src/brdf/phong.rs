@@ -18,14 +18,44 @@ pub struct Phong {
     pub(super) diffuse: Rgb,
     specular: Rgb,
     exponent: f64,
+    /// The lobe is a mirror's, and not here: [`super::Specular`].
+    is_sharp: bool,
 }
 
 impl Phong {
-    /// Lambertian reflectance, lobe reflectance at normal incidence, exponent (limited as [`super::MIN_ALPHA`] asks).
+    /// Lambertian reflectance, lobe reflectance at normal incidence, exponent.
     pub fn new(diffuse: Rgb, specular: Rgb, exponent: f64) -> Self {
-        // √(2/(n + 2)) is the α of the GGX lobe of about the same width.
-        let sharpest = 2.0 / (super::MIN_ALPHA * super::MIN_ALPHA) - 2.0;
-        Self { diffuse, specular, exponent: exponent.clamp(0.0, sharpest) }
+        Self { diffuse, specular, exponent: exponent.clamp(0.0, 2e8), is_sharp: false }
+    }
+
+    /// The same without its lobe, which is a mirror's.
+    pub fn sharp(self) -> Self {
+        Self { is_sharp: true, ..self }
+    }
+
+    /// The same with a lobe that is at least as wide as a GGX lobe of `alpha`.
+    pub fn at_least(self, alpha: f64) -> Self {
+        Self { exponent: self.exponent.min(2.0 / (alpha * alpha) - 2.0), ..self }
+    }
+
+    /// The same with a part of the base that does not scatter.
+    pub fn without(self, transmitted: f64) -> Self {
+        Self { diffuse: self.diffuse * (1.0 - transmitted), ..self }
+    }
+
+    /// √(2/(n + 2)), the α of the GGX lobe of about the same width.
+    pub fn alpha(&self) -> f64 {
+        (2.0 / (self.exponent + 2.0)).sqrt()
+    }
+
+    /// True if the lobe is a mirror's.
+    pub fn is_sharp(&self) -> bool {
+        self.is_sharp
+    }
+
+    /// Reflectance of the lobe at normal incidence.
+    pub fn reflectance(&self) -> Rgb {
+        self.specular
     }
 
     pub(super) fn lobe(&self, n: DVec3, wi: DVec3, wo: DVec3) -> Rgb {
@@ -33,7 +63,10 @@ impl Phong {
     }
 
     pub(super) fn lobe_albedo(&self, cosine: f64) -> Rgb {
-        self.specular * table::phong().at(cosine, (2.0 / (self.exponent + 2.0)).sqrt())
+        if self.is_sharp {
+            return Rgb::BLACK;
+        }
+        self.specular * table::phong().at(cosine, self.alpha())
     }
 
     pub(super) fn lobe_sample(&self, n: DVec3, wi: DVec3, u: [f64; 2]) -> DVec3 {

@@ -3,9 +3,11 @@
 //! Everything is a pure function of (seed, index), so that no thread count, batch or resume can change a
 //! result. Not here: what is sampled with them (brdf, solve).
 
+pub mod pixel;
 pub mod sobol;
 pub mod stream;
 pub mod warp;
 
+pub use pixel::PixelSample;
 pub use sobol::{Sobol, SobolBlock};
 pub use stream::Stream;

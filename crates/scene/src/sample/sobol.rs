@@ -108,7 +108,7 @@ impl SobolBlock<'_> {
 
 /// Owen scrambling of the digits after the binary point, given the first one lowest, returned the first one highest.
 #[inline]
-fn owen_scramble(reversed: u32, seed: u32) -> u32 {
+pub(super) fn owen_scramble(reversed: u32, seed: u32) -> u32 {
     // Multiplication and addition carry only upwards, that is towards less significant digits of the original: each
     // digit is flipped depending on the digits before it, which is what nested scrambling means.
     let mut x = reversed;

@@ -12,6 +12,7 @@ mod order;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use twinray_scene::passing::{Arrival, End};
 use twinray_scene::sample::{Sobol, Stream};
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
@@ -40,6 +41,8 @@ const WITNESS: usize = 8;
 
 /// Purpose of the counter-based stream that finds another place where a patch has a hole.
 const STREAM_HOLES: u64 = 1;
+/// The same, that decides whether rays go on at mirrors and glass.
+const STREAM_PASSING: u64 = 0x9A55;
 
 /// What all waves of a solve share.
 #[derive(Clone, Copy)]
@@ -77,6 +80,8 @@ struct Task {
 struct Bench {
     lows: Vec<u32>,
     shots: Vec<Shot>,
+    /// Per shot, in scenes where rays go on at some surfaces.
+    passages: Vec<Passage>,
 }
 
 /// Where a ray started and what it met.
@@ -90,6 +95,19 @@ struct Shot {
     direction: DVec3,
     /// Where it started on the shooter; of rays from the sky, the origin.
     point: DVec3,
+}
+
+/// What a ray passed.
+#[derive(Clone, Copy, Debug)]
+struct Passage {
+    /// Number of the ray.
+    index: u64,
+    /// Unit direction in which it arrived.
+    direction: DVec3,
+    /// Throughput over the probability of going on.
+    factor: Rgb,
+    /// Probability of having stopped at the far end, and of stopping at the shooter from the other end.
+    stops: [f64; 2],
 }
 
 /// The environment as an end of a ray.
@@ -126,14 +144,15 @@ impl WaveContext<'_> {
         tasks.par_iter_mut().enumerate().for_each_init(Bench::default, |bench, (t, task)| {
             (task.tally, task.fit) = Default::default();
             bench.shots.clear();
+            bench.passages.clear();
             if is_mine(t) {
                 (self.lap)(Stage::Wait);
                 self.start(frozen, &order, t, bench, task);
                 (self.lap)(Stage::Shoot);
-                self.trace(&mut bench.shots);
+                self.trace(bench);
                 (self.lap)(Stage::Trace);
             }
-            self.estimate(frozen, &bench.shots, witness, task);
+            self.estimate(frozen, bench, witness, task);
             (self.lap)(Stage::Estimate);
         });
         if let Some(peers) = peers {
@@ -149,13 +168,19 @@ impl WaveContext<'_> {
 
     /// Selects patches and shoots: fills `shots` with where the rays of a task start and where they go.
     fn start(&self, frozen: &Frozen, order: &Order, t: usize, bench: &mut Bench, task: &mut Task) {
-        let Bench { lows, shots } = bench;
+        let Bench { lows, shots, passages } = bench;
+        let passes = self.scene.has_specular();
         order.fill(t, lows);
         (self.lap)(Stage::Order);
         let mut cursor = 0;
         order.each(lows, |index, block| {
             task.tally.rays += 1;
-            shots.extend(self.shot(frozen, index, block.point(index as u32), &mut cursor));
+            let Some(shot) = self.shot(frozen, index, block.point(index as u32), &mut cursor) else { return };
+            shots.push(shot);
+            if passes {
+                let direction = shot.direction;
+                passages.push(Passage { index, direction, factor: Rgb::WHITE, stops: [1.0; 2] });
+            }
         });
     }
 
@@ -177,8 +202,11 @@ impl WaveContext<'_> {
         Some(Shot { shooter: shooter.0, far: SKY, direction, point })
     }
 
-    fn trace(&self, shots: &mut [Shot]) {
-        for shot in shots {
+    fn trace(&self, bench: &mut Bench) {
+        if !bench.passages.is_empty() {
+            return self.trace_through(bench);
+        }
+        for shot in &mut bench.shots {
             let hit = match Shot::patch(shot.shooter) {
                 Some(shooter) => self.scene.trace_from(shooter, shot.point, shot.direction),
                 None => self.scene.trace(shot.point, shot.direction),
@@ -190,8 +218,29 @@ impl WaveContext<'_> {
         }
     }
 
+    /// Follows rays to where they stop.
+    fn trace_through(&self, bench: &mut Bench) {
+        for (shot, passage) in bench.shots.iter_mut().zip(&mut bench.passages) {
+            let mut random = Stream::new(self.seed, STREAM_PASSING, passage.index);
+            let shooter = Shot::patch(shot.shooter);
+            let arrival = self.scene.trace_through(shooter, shot.point, shot.direction, || random.uniform());
+            let Arrival { end, direction, factor, stop } = arrival;
+            shot.far = match end {
+                End::Patch(patch) => patch.0,
+                End::Back | End::Lost => BACK,
+                End::Sky => SKY,
+            };
+            let other = match shooter {
+                Some(shooter) if shot.far != BACK => self.scene.stop_chance(shooter, shot.direction),
+                _ => 1.0,
+            };
+            *passage = Passage { direction, factor, stops: [stop, other], ..*passage };
+        }
+    }
+
     /// Turns rays into deposits.
-    fn estimate(&self, frozen: &Frozen, shots: &[Shot], witness: Option<&Witness>, task: &mut Task) {
+    fn estimate(&self, frozen: &Frozen, bench: &Bench, witness: Option<&Witness>, task: &mut Task) {
+        let Bench { shots, passages, .. } = bench;
         let buckets = Buckets::of(self.scene.len());
         let glossy = !self.glossy.patches().is_empty();
         // What part of a deposit is direct light matters only where a picture of a glossy patch is summed.
@@ -219,30 +268,34 @@ impl WaveContext<'_> {
             None => frozen.sky(-direction),
         };
         for (k, shot) in shots.iter().enumerate() {
-            let here = endpoint(shot.shooter, shot.direction);
+            let (arrived, factor, [stop, other_stop]) = match passages.get(k) {
+                Some(passage) => (passage.direction, passage.factor, passage.stops),
+                None => (shot.direction, Rgb::WHITE, [1.0; 2]),
+            };
+            let here = endpoint(shot.shooter, shot.direction).stopping(stop);
             if shot.far == BACK {
                 // From outside, the sky meets outer faces, whose backs absorb without a loss.
                 if shot.shooter != SKY {
-                    tally.lost += here.radiance / here.density;
+                    tally.lost += here.radiance * factor / here.density;
                 }
                 continue;
             }
-            let there = endpoint(shot.far, -shot.direction);
-            let (on_far, on_shooter) = if shot.shooter == SKY || shot.far == SKY {
-                if shot.shooter == shot.far {
-                    continue;
-                }
-                let d = transfer(self.estimator, &here, &there);
-                let (sky, escaped) = if shot.far == SKY { (d.on_shooter, d.on_hit) } else { (d.on_hit, d.on_shooter) };
-                tally.sky += sky;
-                tally.escaped += escaped;
-                (d.on_hit, d.on_shooter)
-            } else {
-                let d = transfer(self.estimator, &here, &there);
-                (d.on_hit, d.on_shooter)
+            if shot.shooter == SKY && shot.far == SKY {
+                continue;
+            }
+            let there = endpoint(shot.far, -arrived).stopping(other_stop);
+            let d = transfer(self.estimator, &here, &there);
+            let (on_far, on_shooter) = match passages.is_empty() {
+                true => (d.on_hit, d.on_shooter),
+                false => (d.on_hit * factor, d.on_shooter * factor),
             };
+            if shot.far == SKY {
+                (tally.sky, tally.escaped) = (tally.sky + on_shooter, tally.escaped + on_far);
+            } else if shot.shooter == SKY {
+                (tally.sky, tally.escaped) = (tally.sky + on_far, tally.escaped + on_shooter);
+            }
             let ends = [
-                (shot.far, on_far, shot.shooter, &here, -shot.direction),
+                (shot.far, on_far, shot.shooter, &here, -arrived),
                 (shot.shooter, on_shooter, shot.far, &there, shot.direction),
             ];
             for (end, power, far, from, wi) in ends {
@@ -253,6 +306,10 @@ impl WaveContext<'_> {
                     tally.invalid += 1;
                     Rgb::BLACK
                 };
+                if !passages.is_empty() {
+                    // What goes on is in nobody's albedo.
+                    tally.absorbed += -(power * self.scene.passed_share(patch, wi));
+                }
                 let wi = (glossy && self.glossy.number_of(patch).is_some()).then(|| direction::pack(wi));
                 deposits.push(buckets, Deposit::new(patch, power, false), wi);
                 if splits(patch, far) {
@@ -261,14 +318,14 @@ impl WaveContext<'_> {
                 }
             }
             if let Some(witness) = witness.filter(|_| k % WITNESS == 0) {
-                let parts = |end: u32, e: &Endpoint| match Shot::patch(end) {
-                    Some(patch) => frozen.parts(patch, e.density),
+                let parts = |end: u32, e: &Endpoint, stop: f64| match Shot::patch(end) {
+                    Some(patch) => frozen.parts(patch, e.density / stop).map(|p| p * stop),
                     None => [0.0, 0.0, 0.0, 0.0, e.density],
                 };
                 let squares = |end: u32, power: Rgb| Shot::patch(end).map_or([0.0; 2], |p| witness.squares(p, power));
                 let [a, b] = [squares(shot.far, on_far), squares(shot.shooter, on_shooter)];
                 let squares = [a[0] + b[0], a[1] + b[1]];
-                fit.observe(squares, here.density + there.density, parts(shot.shooter, &here), parts(shot.far, &there));
+                fit.observe(squares, here.density + there.density, parts(shot.shooter, &here, stop), parts(shot.far, &there, other_stop));
             }
         }
     }

@@ -1,0 +1,143 @@
+//! `twinray render --method gather`: solve, then trace the last bounce, in passes until the picture is good enough.
+
+use std::time::Instant;
+
+use anyhow::bail;
+use serde_json::json;
+use twinray::render::{Gather, GatherOptions};
+use twinray::scene::Camera;
+
+use super::render::{Light, default_output, default_size, encode, exposure, light};
+use crate::args::RenderArgs;
+use crate::commands::{self, solving};
+use crate::failure::Ending;
+use crate::input::Loaded;
+use crate::interrupt;
+use crate::output::Output;
+use crate::progress::{Goal, Progress};
+
+/// Camera rays per pixel where the user does not say how long.
+const DEFAULT_SAMPLES: u32 = 64;
+/// Camera rays per pixel of the first pass, and before an estimated error is believed.
+const FIRST_SAMPLES: f64 = 8.0;
+/// By what each pass makes the number of rays grow: plans are made anew, and signals and clocks are heeded, in between.
+const GROWTH: f64 = 1.25;
+/// Of the time that the user gives, what a solve may take at most.
+const SOLVE_SHARE: f64 = 0.3;
+
+/// Refuses settings that would be ignored.
+pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
+    let patches = [(args.flat, "--flat"), (args.lobes.is_some(), "--lobes")];
+    match patches.iter().find(|(given, _)| *given) {
+        Some((_, option)) => bail!("{option} is for --method patches"),
+        None => Ok(()),
+    }
+}
+
+/// Solves, gathers, writes and reports.
+pub(super) fn run(
+    args: &RenderArgs,
+    loaded: &Loaded,
+    camera: &Camera,
+    output: Output,
+    loading: f64,
+) -> anyhow::Result<Ending> {
+    let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
+    // --time and --error are the picture's: its solve is as long as it would be without, or a part of the time.
+    let patches = loaded.patches.len();
+    let goal = match (args.solve.rays, args.solve.time) {
+        (None, Some(seconds)) => Goal::First(solving::default_rays(patches), SOLVE_SHARE * seconds),
+        (Some(rays), _) => Goal::Rays(rays),
+        (None, None) => Goal::Rays(solving::default_rays(patches)),
+    };
+    let Light { solution, settings, seconds, rate, interrupted } = light(args, loaded, None, goal)?;
+    let balance = solution.balance();
+    let mut warnings = loaded.warnings.clone();
+    let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
+    commands::print_warnings(loss.as_slice(), args.load.quiet);
+    warnings.extend(loss);
+    if !args.load.quiet {
+        crate::say!("{}", commands::balance_line(&balance));
+        crate::say!(
+            "{}: {} rays {} in {seconds:.1} s{}, estimated error {:.2} %, seed {}",
+            loaded.name,
+            solution.rays(),
+            if loaded.stored.is_some() { "read" } else { "shot" },
+            if rate > 0.0 { format!(" ({:.2} M/s)", rate * 1e-6) } else { String::new() },
+            100.0 * solution.relative_error(),
+            settings.seed,
+        );
+    }
+
+    let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
+    let pixels = u64::from(width) * u64::from(height);
+    // With --samples beside --time or --error, whichever is reached first.
+    let left = args.solve.time.map(|s| Goal::Seconds((s - seconds).max(0.0)));
+    let until = left.or(args.solve.error.map(Goal::Error));
+    let most = args.path.samples.unwrap_or(if until.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
+    let goal = until.unwrap_or(Goal::Rays(u64::from(most) * pixels));
+    let mut progress = Progress::new(goal, args.load.quiet).counting("camera rays");
+    let options = GatherOptions { width, height, seed: settings.seed, adaptive: true };
+    let mut gather = Gather::new(&loaded.patches, &solution, camera, &options);
+    loop {
+        let next = (gather.samples() * GROWTH).max(FIRST_SAMPLES).min(f64::from(most));
+        gather.advance_to(next);
+        if progress.wants_update() {
+            progress.update(gather.rays(), gather.relative_error());
+        }
+        let error = || if gather.samples() < FIRST_SAMPLES { f64::INFINITY } else { gather.relative_error() };
+        let is_full = gather.samples() >= f64::from(most) * (1.0 - 1e-9);
+        if progress.is_reached(gather.rays(), error) || is_full || interrupt::requested() {
+            break;
+        }
+    }
+    let interrupted = interrupted || interrupt::requested();
+    progress.finish();
+    let gathering = progress.seconds();
+
+    let start = Instant::now();
+    let picture = gather.picture();
+    let factor = exposure(args).factor(&picture);
+    let how = format!(
+        "{} rays, {:.1} camera rays per pixel, seed {}, preset {:?}",
+        solution.rays(),
+        gather.samples(),
+        settings.seed,
+        settings.preset
+    );
+    output.write(&encode(args, loaded, &picture, factor, &how, &path))?;
+    let drawing = start.elapsed().as_secs_f64();
+    let error = gather.relative_error();
+    let camera_rate = gather.rays() as f64 / gathering.max(1e-9);
+    if !args.load.quiet {
+        crate::say!(
+            "{}: {:.1} camera rays per pixel in {gathering:.1} s ({:.2} M/s), estimated noise of a pixel {:.2} %; exposure {:+.2} EV",
+            path.display(),
+            gather.samples(),
+            camera_rate * 1e-6,
+            100.0 * error,
+            factor.log2(),
+        );
+    }
+    if args.load.json {
+        let report = json!({
+            "output": path.display().to_string(), "method": "gather",
+            "scene": loaded.name, "camera": camera.name,
+            "triangles": loaded.patches.triangle_count(), "patches": patches,
+            "rays": solution.rays(), "seed": settings.seed, "interrupted": interrupted,
+            "seconds": { "load": loading, "solve": seconds, "gather": gathering, "picture": drawing },
+            "rays_per_second": rate,
+            "relative_error": solution.relative_error(),
+            "camera_rays_per_pixel": gather.samples(), "camera_rays": gather.rays(),
+            "camera_rays_per_second": camera_rate,
+            "picture_error": error,
+            "invalid_deposits": solution.invalid_deposits(), "invalid_camera_rays": gather.invalid(),
+            "power": commands::balance_json(&balance),
+            "exposure_ev": factor.log2(),
+            "expected": loaded.expected.json(),
+            "warnings": warnings,
+        });
+        println!("{report:#}");
+    }
+    Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}

@@ -1,0 +1,91 @@
+//! Light straight from what emits, at one point: a shadow ray to the best of some candidates.
+//!
+//! Candidates are weighed against the BRDF's own rays by the balance heuristic; one is chosen by what it would give, so
+//! that the only shadow ray goes where it matters (Talbot, Cline, Egbert, "Importance resampling for global
+//! illumination", EGSR 2005).
+
+use glam::DVec3;
+use twinray_scene::brdf::Brdf;
+use twinray_scene::{PatchScene, Rgb};
+
+use crate::lights::Lights;
+use crate::vertex::Vertex;
+
+/// Which part of a BRDF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// All of it.
+    Whole,
+    /// Its lobe.
+    Lobe,
+}
+
+impl Part {
+    /// f_r of the part.
+    pub fn eval(self, brdf: &Brdf, n: DVec3, wi: DVec3, wo: DVec3) -> Rgb {
+        match self {
+            Part::Whole => brdf.eval(n, wi, wo),
+            Part::Lobe => brdf.lobe_eval(n, wi, wo),
+        }
+    }
+
+    /// A direction about proportional to the part × cosine.
+    pub fn sample(self, brdf: &Brdf, n: DVec3, wo: DVec3, u: [f64; 2]) -> Option<DVec3> {
+        match self {
+            Part::Whole => brdf.sample(n, wo, u),
+            Part::Lobe => brdf.lobe_sample(n, wo, u),
+        }
+    }
+
+    /// Density of [`Part::sample`].
+    pub fn pdf(self, brdf: &Brdf, n: DVec3, wo: DVec3, wi: DVec3) -> f64 {
+        match self {
+            Part::Whole => brdf.pdf(n, wo, wi),
+            Part::Lobe => brdf.lobe_pdf(n, wo, wi),
+        }
+    }
+}
+
+/// One sample of the radiance that a part of `vertex` reflects towards `wo` of light straight from what emits.
+/// `numbers` gives pairs of uniform numbers, two for each of `candidates` and one more.
+pub(crate) fn direct(
+    scene: &PatchScene,
+    lights: &Lights,
+    vertex: &Vertex,
+    wo: DVec3,
+    part: Part,
+    candidates: u32,
+    mut numbers: impl FnMut() -> [f64; 2],
+) -> Rgb {
+    let Vertex { point, geometric, normal, scatter, .. } = vertex;
+    let (mut sum, mut chosen) = (0.0, None);
+    let [mut pick, _] = numbers();
+    for _ in 0..candidates {
+        let ([choice, _], place) = (numbers(), numbers());
+        let Some(light) = lights.sample(*point, choice, place) else { continue };
+        let cosine = normal.dot(light.towards);
+        if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 {
+            continue;
+        }
+        let density = f64::from(candidates) * light.density + part.pdf(&scatter.brdf, *normal, wo, light.towards);
+        let gives = light.radiance * part.eval(&scatter.brdf, *normal, light.towards, wo) * (cosine / density);
+        let luminance = gives.luminance();
+        if luminance > 0.0 {
+            sum += luminance;
+            // One uniform number serves all choices: what is left of its interval is uniform again.
+            let probability = luminance / sum;
+            if pick < probability {
+                chosen = Some((gives / luminance, light));
+                pick /= probability;
+            } else {
+                pick = (pick - probability) / (1.0 - probability);
+            }
+        }
+    }
+    let Some((gives, light)) = chosen else { return Rgb::BLACK };
+    let seen = match light.end {
+        Some((end, normal_there)) => scene.transmittance(*point, *geometric, end, normal_there),
+        None => scene.transmittance_from_sky(vertex.patch, *point, light.towards),
+    };
+    gives * seen * sum
+}

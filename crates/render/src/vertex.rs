@@ -1,0 +1,113 @@
+//! A point where a path meets a surface, and the ways on from it.
+//!
+//! What a camera sees, be it in mirrors and through glass, has the author's display normals; everywhere else normals are
+//! geometric, as in the solver's transport. Knows no solution: the path tracer uses it too.
+
+use glam::DVec3;
+use twinray_scene::brdf::{Detail, Event, Scatter, mirrored};
+use twinray_scene::{PatchId, PatchScene, Rgb, Side, SurfaceHit};
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    pub patch: PatchId,
+    pub point: DVec3,
+    /// Of the triangle, on the side that was met.
+    pub geometric: DVec3,
+    /// What reflections follow.
+    pub normal: DVec3,
+    pub scatter: Scatter,
+    /// Whether the back was met: of glass, from within.
+    pub inside: bool,
+}
+
+/// How normals and lobes are to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Look {
+    /// As a camera sees them.
+    Display,
+    /// Geometric normals, colours and lobes at full resolution.
+    Plain,
+    /// As the solver has them: colours are means of patches.
+    Patch,
+}
+
+/// A way on that was chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    pub direction: DVec3,
+    /// Geometric normal on the side to which it leaves.
+    pub side: DVec3,
+    /// What the path is multiplied by.
+    pub factor: Rgb,
+    /// What attenuates it, 1/m.
+    pub medium: Option<Rgb>,
+    /// True if it goes straight on through a pane, as shadow rays do.
+    pub straight: bool,
+}
+
+/// What happens to a path at a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Step {
+    /// It is scattered by the BRDF; the factor is 1 over the probability of that.
+    Scatter(f64),
+    /// It goes on sharply.
+    On(Way),
+    /// It ends in the dark.
+    End,
+}
+
+impl Vertex {
+    /// Where a ray from direction `wo` (towards its origin) met `patch`.
+    pub fn new(scene: &PatchScene, hit: &SurfaceHit, patch: PatchId, wo: DVec3, look: Look) -> Self {
+        let geometric = scene.normal(patch);
+        let normal = match look {
+            Look::Display => {
+                let smooth = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+                if smooth.dot(wo) > 0.0 { smooth } else { geometric }
+            }
+            _ => geometric,
+        };
+        let scatter = match look {
+            Look::Patch => scene.scatter(patch),
+            _ => scene.scatter_at(hit, Detail::Picture),
+        };
+        let point = scene.point_of(hit.triangle, hit.u, hit.v);
+        Self { patch, point, geometric, normal, scatter, inside: hit.side == Side::Back }
+    }
+
+    /// Chooses what happens to a path that came from `wo`; `event` is uniform, and so is `blur`, which is used where
+    /// transmission is rough.
+    pub fn step(&self, wo: DVec3, event: f64, blur: impl FnOnce() -> [f64; 2]) -> Step {
+        let Some(specular) = &self.scatter.specular else { return Step::Scatter(1.0) };
+        let cosine = self.normal.dot(wo);
+        if cosine <= 0.0 {
+            return Step::End;
+        }
+        let rest = self.scatter.brdf.albedo(cosine).max_channel();
+        let choices = specular.choices(cosine, self.inside, rest, false);
+        let (event, factor) = choices.choose(event);
+        match event {
+            Event::Stop if rest == 0.0 => Step::End,
+            Event::Stop => Step::Scatter(factor.r),
+            Event::Reflect => {
+                let smooth = mirrored(self.normal, wo);
+                let direction =
+                    if smooth.dot(self.geometric) > 0.0 { smooth } else { mirrored(self.geometric, wo) };
+                let medium = specular.attenuation().filter(|_| self.inside);
+                Step::On(Way { direction, side: self.geometric, factor, medium, straight: false })
+            }
+            Event::Transmit => {
+                let Some((direction, weight)) = specular.refract_rough(self.normal, wo, self.inside, blur()) else {
+                    return Step::End;
+                };
+                if direction.dot(self.geometric) >= 0.0 {
+                    return Step::End;
+                }
+                let medium = specular.attenuation().filter(|_| !self.inside);
+                let straight = specular.is_pane();
+                Step::On(Way { direction, side: -self.geometric, factor: factor * weight, medium, straight })
+            }
+        }
+    }
+}
