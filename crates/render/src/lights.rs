@@ -1,13 +1,20 @@
 //! What shines, as directions from a point: emitting patches and the sky, sampled and with their density.
 //!
-//! A patch is chosen by the power of its mean emission and a point of it uniformly; what is emitted there is taken
-//! at the very point. Visibility is the caller's.
+//! Patches that belong together are a lamp; the sky is one too. A [`Choice`] among lamps is made, by power or by what was
+//! learnt of a place; then a patch of the lamp by the power of its mean emission, and a point of it uniformly. What is
+//! emitted there is taken at the very point. Visibility is the caller's.
+
+use std::ops::Range;
 
 use glam::DVec3;
 use twinray_scene::{PatchId, PatchScene, Rgb, Side};
 
 /// The most candidates for one shadow ray.
 const MOST_CANDIDATES: u32 = 8;
+/// The most lamps; where there are more, neighbours are one.
+const MOST_LAMPS: usize = 256;
+/// Cosine between the normals of triangles that may be of one lamp.
+const ALIKE: f64 = 0.99;
 
 /// All that emits in a scene.
 pub(crate) struct Lights<'a> {
@@ -16,8 +23,54 @@ pub(crate) struct Lights<'a> {
     patches: Vec<PatchId>,
     /// Running sum of their area × luminance of the mean emission.
     cumulative: Vec<f64>,
-    /// Probability of choosing the sky.
-    sky_share: f64,
+    lamps: Vec<Lamp>,
+    by_power: Choice,
+}
+
+/// What is chosen as a whole.
+#[derive(Clone, Debug, PartialEq)]
+enum Lamp {
+    /// A range of the emitting patches.
+    Patches(Range<usize>),
+    /// The surroundings.
+    Sky,
+}
+
+/// Probabilities of the lamps.
+#[derive(Clone, Debug)]
+pub(crate) struct Choice {
+    probability: Vec<f64>,
+    cumulative: Vec<f64>,
+}
+
+impl Choice {
+    /// In proportion to weights that are not negative; `None` if there is nothing to choose.
+    pub fn new(weights: &[f64]) -> Option<Self> {
+        let total: f64 = weights.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let probability: Vec<f64> = weights.iter().map(|w| w / total).collect();
+        let mut sum = 0.0;
+        let cumulative = probability.iter().map(|p| {
+            sum += p;
+            sum
+        });
+        Some(Self { cumulative: cumulative.collect(), probability })
+    }
+
+    /// Probability of a lamp.
+    pub fn probability(&self, lamp: usize) -> f64 {
+        self.probability[lamp]
+    }
+
+    /// A lamp for a uniform number, and a number that is uniform given the lamp.
+    fn choose(&self, u: f64) -> (usize, f64) {
+        let last = self.probability.iter().rposition(|p| *p > 0.0).unwrap_or(0);
+        let lamp = self.cumulative.partition_point(|&c| c <= u).min(last);
+        let before = self.cumulative[lamp] - self.probability[lamp];
+        (lamp, ((u - before) / self.probability[lamp]).clamp(0.0, 1.0 - f64::EPSILON))
+    }
 }
 
 /// A direction in which something shines.
@@ -30,6 +83,8 @@ pub(crate) struct LightSample {
     pub radiance: Rgb,
     /// The point that shines and its unit normal; `None` for the sky.
     pub end: Option<(DVec3, DVec3)>,
+    /// Number of the lamp.
+    pub lamp: usize,
 }
 
 impl<'a> Lights<'a> {
@@ -41,29 +96,72 @@ impl<'a> Lights<'a> {
             sum += scene.cell_area(p) * scene.emission(p).luminance();
             sum
         });
-        let cumulative = cumulative.collect();
+        let cumulative: Vec<f64> = cumulative.collect();
+        let mut lamps: Vec<Lamp> = ranges(scene, &patches).into_iter().map(Lamp::Patches).collect();
+        let mut this = Self {
+            scene,
+            patches,
+            cumulative,
+            lamps: Vec::new(),
+            by_power: Choice { probability: Vec::new(), cumulative: Vec::new() },
+        };
         // Half and half: how much of the sky gets in is not known, and a path in the dark costs a ray at most.
-        let sky_share = match (scene.environment().is_some(), patches.is_empty()) {
+        let sky_share = match (scene.environment().is_some(), this.patches.is_empty()) {
             (true, true) => 1.0,
             (true, false) => 0.5,
             (false, _) => 0.0,
         };
-        Self { scene, patches, cumulative, sky_share }
+        let total = this.cumulative.last().copied().unwrap_or(1.0);
+        let mut weights: Vec<f64> = lamps
+            .iter()
+            .map(
+                |lamp| {
+                    if let Lamp::Patches(range) = lamp { (1.0 - sky_share) * this.power(range) / total } else { 0.0 }
+                },
+            )
+            .collect();
+        if sky_share > 0.0 {
+            lamps.push(Lamp::Sky);
+            weights.push(sky_share);
+        }
+        this.lamps = lamps;
+        if let Some(choice) = Choice::new(&weights) {
+            this.by_power = choice;
+        }
+        this
+    }
+
+    /// Number of lamps.
+    pub fn len(&self) -> usize {
+        self.lamps.len()
+    }
+
+    /// The choice by power.
+    pub fn by_power(&self) -> &Choice {
+        &self.by_power
     }
 
     /// A direction from `point` about proportional to what shines there. `None` where the choice shines elsewhere: a
     /// hole, a back, or no light at all. The density then integrates to less than one.
-    pub fn sample(&self, point: DVec3, choice: f64, [s, t]: [f64; 2]) -> Option<LightSample> {
-        if choice < self.sky_share {
+    pub fn sample(&self, point: DVec3, choice: f64, place: [f64; 2]) -> Option<LightSample> {
+        self.sample_by(&self.by_power, point, choice, place)
+    }
+
+    /// The same by another choice.
+    pub fn sample_by(&self, by: &Choice, point: DVec3, choice: f64, [s, t]: [f64; 2]) -> Option<LightSample> {
+        if self.lamps.is_empty() {
+            return None;
+        }
+        let (lamp, within) = by.choose(choice);
+        let Lamp::Patches(range) = &self.lamps[lamp] else {
             let sky = self.scene.environment()?;
             let towards = sky.sample_direction([s, t]);
-            let density = self.sky_density(towards);
-            return Some(LightSample { towards, density, radiance: sky.radiance(towards), end: None });
-        }
-        let total = *self.cumulative.last()?;
-        let within = (choice - self.sky_share) / (1.0 - self.sky_share) * total;
-        let index = self.cumulative.partition_point(|&c| c <= within).min(self.patches.len() - 1);
-        let patch = self.patches[index];
+            let density = by.probability(lamp) * sky.pdf_direction(towards);
+            return Some(LightSample { towards, density, radiance: sky.radiance(towards), end: None, lamp });
+        };
+        let target = self.before(range) + within * self.power(range);
+        let index = range.start + self.cumulative[range.clone()].partition_point(|&c| c <= target);
+        let patch = self.patches[index.min(range.end - 1)];
         let triangle = self.scene.triangle_of(patch);
         let [u, v] = self.scene.cell_place_at(patch, s, t);
         if !self.scene.is_present(triangle, u, v) {
@@ -71,37 +169,87 @@ impl<'a> Lights<'a> {
         }
         let (end, normal) = (self.scene.point_of(triangle, u, v), self.scene.normal(patch));
         let towards = (end - point).try_normalize()?;
-        let density = self.density(point, patch, end);
+        let per_power = by.probability(lamp) / self.power(range);
+        let density = self.solid_angle_density(per_power, point, patch, end);
         let radiance = self.scene.emission_at(triangle, Side::Front, u, v);
-        (density > 0.0).then_some(LightSample { towards, density, radiance, end: Some((end, normal)) })
+        (density > 0.0).then_some(LightSample { towards, density, radiance, end: Some((end, normal)), lamp })
     }
 
     /// Density per solid angle with which [`Lights::sample`] chooses the direction from `point` to `end` on `patch`;
     /// 0 on the back of a lamp and where nothing emits.
     pub fn density(&self, point: DVec3, patch: PatchId, end: DVec3) -> f64 {
-        let luminance = self.scene.emission(patch).luminance();
-        let between = end - point;
-        let cosine = -between.dot(self.scene.normal(patch));
-        if luminance <= 0.0 || cosine <= 0.0 {
+        self.density_by(&self.by_power, point, patch, end)
+    }
+
+    /// The same of [`Lights::sample_by`].
+    pub fn density_by(&self, by: &Choice, point: DVec3, patch: PatchId, end: DVec3) -> f64 {
+        if self.scene.emission(patch).luminance() <= 0.0 {
             return 0.0;
         }
-        let total = self.cumulative.last().copied().unwrap_or(f64::INFINITY);
-        // Per area it is luminance / total; |between|³ since the cosine above still has the length in it.
-        (1.0 - self.sky_share) * luminance / total * between.length_squared() * between.length() / cosine
+        let Ok(index) = self.patches.binary_search(&patch) else { return 0.0 };
+        let lamp = self.lamps.partition_point(|l| matches!(l, Lamp::Patches(range) if range.end <= index));
+        let Some(Lamp::Patches(range)) = self.lamps.get(lamp) else { return 0.0 };
+        self.solid_angle_density(by.probability(lamp) / self.power(range), point, patch, end)
+    }
+
+    /// Density per solid angle of a patch whose points are chosen with a density of luminance × `per_power` per area.
+    fn solid_angle_density(&self, per_power: f64, point: DVec3, patch: PatchId, end: DVec3) -> f64 {
+        let between = end - point;
+        let cosine = -between.dot(self.scene.normal(patch));
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        // |between|³ since the cosine above still has the length in it.
+        self.scene.emission(patch).luminance() * per_power * between.length_squared() * between.length() / cosine
     }
 
     /// How many candidates are worth their while where one of them is chosen: many lamps need many.
     pub fn candidates(&self) -> u32 {
-        let mut triangles: Vec<u32> = self.patches.iter().map(|&p| self.scene.triangle_of(p)).collect();
-        triangles.dedup();
-        let lamps = triangles.len() as u32 / 2 + u32::from(self.sky_share > 0.0);
-        lamps.clamp(1, MOST_CANDIDATES)
+        (self.lamps.len() as u32).clamp(1, MOST_CANDIDATES)
     }
 
     /// Density per solid angle with which [`Lights::sample`] chooses `towards` for the sky.
     pub fn sky_density(&self, towards: DVec3) -> f64 {
-        self.scene.environment().map_or(0.0, |sky| self.sky_share * sky.pdf_direction(towards))
+        self.sky_density_by(&self.by_power, towards)
     }
+
+    /// The same of [`Lights::sample_by`].
+    pub fn sky_density_by(&self, by: &Choice, towards: DVec3) -> f64 {
+        let Some(lamp) = self.lamps.iter().rposition(|l| *l == Lamp::Sky) else { return 0.0 };
+        self.scene.environment().map_or(0.0, |sky| by.probability(lamp) * sky.pdf_direction(towards))
+    }
+
+    fn before(&self, range: &Range<usize>) -> f64 {
+        if range.start == 0 { 0.0 } else { self.cumulative[range.start - 1] }
+    }
+
+    /// Area × luminance of the patches in a range.
+    fn power(&self, range: &Range<usize>) -> f64 {
+        self.cumulative[range.end - 1] - self.before(range)
+    }
+}
+
+/// Emitting patches by lamp: those of one flat face together, and neighbours where there are very many.
+fn ranges(scene: &PatchScene, patches: &[PatchId]) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (k, &patch) in patches.iter().enumerate() {
+        let joins = k > 0 && {
+            let last = patches[k - 1];
+            let same = scene.triangle_of(last) == scene.triangle_of(patch);
+            let next = scene.triangle_of(last) + 1 == scene.triangle_of(patch)
+                && scene.material_of(last) == scene.material_of(patch)
+                && scene.normal(last).dot(scene.normal(patch)) > ALIKE;
+            same || next
+        };
+        match ranges.last_mut() {
+            Some(range) if joins => range.end = k + 1,
+            _ => ranges.push(k..k + 1),
+        }
+    }
+    while ranges.len() > MOST_LAMPS {
+        ranges = ranges.chunks(2).map(|pair| pair[0].start..pair[pair.len() - 1].end).collect();
+    }
+    ranges
 }
 
 #[cfg(test)]

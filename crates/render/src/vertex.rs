@@ -92,8 +92,7 @@ impl Vertex {
             Event::Stop => Step::Scatter(factor.r),
             Event::Reflect => {
                 let smooth = mirrored(self.normal, wo);
-                let direction =
-                    if smooth.dot(self.geometric) > 0.0 { smooth } else { mirrored(self.geometric, wo) };
+                let direction = if smooth.dot(self.geometric) > 0.0 { smooth } else { mirrored(self.geometric, wo) };
                 let medium = specular.attenuation().filter(|_| self.inside);
                 Step::On(Way { direction, side: self.geometric, factor, medium, straight: false })
             }

@@ -74,6 +74,11 @@ impl<'a> Gather<'a> {
         film::picture(&self.pixels, self.options.width)
     }
 
+    /// The part of the picture that surfaces reflect of light straight from what emits, in every pixel, linear radiance.
+    pub fn direct(&self) -> Vec<[f32; 3]> {
+        self.pixels.iter().map(|p| p.direct().to_f32()).collect()
+    }
+
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
     /// second batch of rays.
     pub fn variance(&self) -> Vec<f32> {

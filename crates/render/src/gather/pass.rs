@@ -47,7 +47,9 @@ impl Gather<'_> {
     fn plan(&self, budget: f64) -> Vec<u32> {
         let (width, height) = (self.options.width as usize, self.options.height as usize);
         let mean = self.pixels.iter().map(|p| p.radiance().luminance()).sum::<f64>() / self.pixels.len().max(1) as f64;
-        let near = |index: usize, side: usize, end: usize| index.saturating_sub(AROUND)..(index + AROUND + 1).min(end).max(side);
+        let near = |index: usize, side: usize, end: usize| {
+            index.saturating_sub(AROUND)..(index + AROUND + 1).min(end).max(side)
+        };
         let noise: Vec<f64> = (0..self.pixels.len())
             .into_par_iter()
             .map(|index| {

@@ -128,7 +128,8 @@ impl<'a> Estimator<'a> {
                 }
                 Step::Scatter(factor) => {
                     throughput *= factor;
-                    let Some(part) = self.part(&vertex, &hit, wo, &scattered, count, &mut throughput, event[1], &mut found)
+                    let Some(part) =
+                        self.part(&vertex, &hit, wo, &scattered, count, &mut throughput, event[1], &mut found)
                     else {
                         break;
                     };
