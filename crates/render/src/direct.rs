@@ -8,7 +8,7 @@ use glam::DVec3;
 use twinray_scene::brdf::Brdf;
 use twinray_scene::{PatchScene, Rgb};
 
-use crate::lights::Lights;
+use crate::lights::{Choice, Lights};
 use crate::vertex::Vertex;
 
 /// Which part of a BRDF.
@@ -46,23 +46,33 @@ impl Part {
     }
 }
 
-/// One sample of the radiance that a part of `vertex` reflects towards `wo` of light straight from what emits.
-/// `numbers` gives pairs of uniform numbers, two for each of `candidates` and one more.
+/// How lamps are chosen for shadow rays.
+#[derive(Clone, Copy)]
+pub(crate) struct Shadows<'a> {
+    /// Probabilities of the lamps.
+    pub choice: &'a Choice,
+    /// Candidates for one shadow ray.
+    pub candidates: u32,
+}
+
+/// One sample of the radiance that a part of `vertex` reflects towards `wo` of light straight from what emits, and the
+/// lamp that it comes from. `numbers` gives pairs of uniform numbers, two for each candidate and one more.
 pub(crate) fn direct(
     scene: &PatchScene,
     lights: &Lights,
     vertex: &Vertex,
     wo: DVec3,
     part: Part,
-    candidates: u32,
+    shadows: Shadows,
     mut numbers: impl FnMut() -> [f64; 2],
-) -> Rgb {
+) -> (Rgb, Option<usize>) {
+    let Shadows { choice: by, candidates } = shadows;
     let Vertex { point, geometric, normal, scatter, .. } = vertex;
     let (mut sum, mut chosen) = (0.0, None);
     let [mut pick, _] = numbers();
     for _ in 0..candidates {
         let ([choice, _], place) = (numbers(), numbers());
-        let Some(light) = lights.sample(*point, choice, place) else { continue };
+        let Some(light) = lights.sample_by(by, *point, choice, place) else { continue };
         let cosine = normal.dot(light.towards);
         if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 {
             continue;
@@ -82,10 +92,10 @@ pub(crate) fn direct(
             }
         }
     }
-    let Some((gives, light)) = chosen else { return Rgb::BLACK };
+    let Some((gives, light)) = chosen else { return (Rgb::BLACK, None) };
     let seen = match light.end {
         Some((end, normal_there)) => scene.transmittance(*point, *geometric, end, normal_there),
         None => scene.transmittance_from_sky(vertex.patch, *point, light.towards),
     };
-    gives * seen * sum
+    (gives * seen * sum, Some(light.lamp))
 }

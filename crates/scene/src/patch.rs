@@ -450,14 +450,7 @@ impl PatchScene {
     pub fn scatter_at(&self, hit: &crate::SurfaceHit, detail: Detail) -> Scatter {
         let t = &self.triangles[hit.triangle as usize];
         let color = self.color_at(hit.triangle, hit.u, hit.v);
-        self.scatter_of(
-            hit.triangle,
-            color,
-            f64::from(t.metallic),
-            f64::from(t.roughness),
-            t.transmission,
-            detail,
-        )
+        self.scatter_of(hit.triangle, color, f64::from(t.metallic), f64::from(t.roughness), t.transmission, detail)
     }
 
     /// True if the patch has what a single number does not tell of it: a lobe, or a base under a coat.

@@ -1,18 +1,17 @@
-//! What one camera ray of a gather sees.
+//! What one camera ray of a gather sees, up to where pixels share: the first point that scatters, and the light that one
+//! ray of its BRDF finds.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 use twinray_scene::brdf::attenuated;
 use twinray_scene::sample::PixelSample;
-use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
+use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use super::GatherOptions;
-use crate::direct::{Part, direct};
-use crate::film::Seen;
+use crate::direct::{Part, Shadows, direct};
 use crate::lights::Lights;
-use crate::picture::{first_side, tent};
+use crate::picture::first_side;
 use crate::reconstruct::Reconstruction;
 use crate::vertex::{Look, Step, Vertex};
 
@@ -26,234 +25,261 @@ const MOST_MET: u32 = 32;
 const NARROW: f64 = 3.0;
 /// Pairs of numbers that each met surface may draw.
 const PAIRS: u64 = 64;
+/// The least probability with which a lobe behind the gather ray is followed.
+const LEAST_SURVIVAL: f64 = 0.05;
 
 /// Makes samples of a picture.
 pub(super) struct Estimator<'a> {
     scene: &'a PatchScene,
     solution: &'a Solution,
     reconstruction: Reconstruction<'a>,
-    lights: Lights<'a>,
-    candidates: u32,
+    pub lights: Lights<'a>,
 }
 
-/// Where a path last scattered.
+/// What a camera ray found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sight {
+    /// Light that was seen: in mirrors and through glass too.
+    pub lights: Rgb,
+    /// The first point that scatters.
+    pub point: Option<Point>,
+    /// Nothing was met.
+    pub empty: bool,
+}
+
+/// A point that scatters towards the eye.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub vertex: Vertex,
+    /// Towards the eye.
+    pub wo: DVec3,
+    /// Of the way to the eye.
+    pub throughput: Rgb,
+}
+
+/// What the gather ray of a point found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gathered {
+    pub direction: DVec3,
+    /// Density of the direction per solid angle.
+    pub density: f64,
+    /// Radiance of what emits where the ray ends, weighed against shadow rays.
+    pub emitted: Rgb,
+    /// Radiance that the far end scatters, and where: others may take it as well.
+    pub scattered: Option<(Rgb, DVec3, DVec3)>,
+    /// All other radiance.
+    pub other: Rgb,
+}
+
+/// The last point of a path that scattered.
 #[derive(Clone, Copy)]
-struct Scattered {
+struct Before<'s> {
     point: DVec3,
     /// Density of the direction in which it went on.
     density: f64,
     /// Way since then.
     distance: f64,
-    /// Whether a shadow ray from there may have found what is met next.
-    lit: bool,
+    /// Whether a shadow ray from there may have found what is met next, and how such rays choose.
+    lit: Option<Shadows<'s>>,
 }
 
 impl<'a> Estimator<'a> {
     pub fn new(scene: &'a PatchScene, solution: &'a Solution) -> Self {
         let lights = Lights::new(scene);
-        let candidates = lights.candidates();
-        Self { scene, solution, reconstruction: Reconstruction::new(scene, solution), lights, candidates }
+        Self { scene, solution, reconstruction: Reconstruction::new(scene, solution), lights }
     }
 
-    /// Adds camera ray `k` of a pixel.
-    pub fn add(&self, camera: &Camera, options: &GatherOptions, pixel: usize, k: u32, seen: &mut Seen) {
+    /// How lamps are chosen where nothing is known of a place.
+    pub fn shadows(&self) -> Shadows<'_> {
+        Shadows { choice: self.lights.by_power(), candidates: self.lights.candidates() }
+    }
+
+    /// Follows a camera ray of the world through mirrors and glass.
+    pub fn look(&self, origin: DVec3, direction: DVec3, numbers: &mut PixelSample) -> Sight {
         let scene = self.scene;
-        let mut numbers = PixelSample::new(options.seed, pixel as u64, k);
-        let (width, height) = (f64::from(options.width), f64::from(options.height));
-        let (x, y) = (pixel % options.width as usize, pixel / options.width as usize);
-        let [dx, dy] = numbers.pair().map(tent);
-        let aspect = width / height;
-        let (origin, direction) = camera.ray((x as f64 + dx) / width, (y as f64 + dy) / height, aspect);
-        seen.rays += 1;
-        let Some((hit, patch)) = first_side(scene, origin - scene.centre(), direction) else {
-            seen.empty += 1;
-            let sky = scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction));
-            seen.radiance += sky;
-            seen.lights += sky;
-            seen.covered += u32::from(!sky.is_black());
-            return;
+        let mut sight = Sight::default();
+        let sky = |towards| scene.environment().map_or(Rgb::BLACK, |e| e.radiance(towards));
+        let Some((mut hit, mut patch)) = first_side(scene, origin - scene.centre(), direction) else {
+            return Sight { lights: sky(direction), empty: true, ..sight };
         };
-        let found = self.follow(hit, patch, direction, &mut numbers);
-        let radiance = found.lights + found.direct + found.indirect;
-        if !radiance.is_finite() {
-            seen.invalid += 1;
-            return;
-        }
-        seen.radiance += radiance;
-        seen.direct += found.direct;
-        seen.lights += found.lights;
-        if found.lights.is_black() {
-            seen.unlit += 1;
-            seen.unlit_luminance += radiance.luminance();
-        } else {
-            seen.covered += 1;
-        }
-    }
-
-    /// Follows the path that begins with a camera ray along `direction`, which met `patch`.
-    fn follow(&self, first: SurfaceHit, patch: PatchId, direction: DVec3, numbers: &mut PixelSample) -> Found {
-        let scene = self.scene;
-        let (mut hit, mut patch, mut direction) = (first, patch, direction);
-        let (mut found, mut throughput) = (Found::default(), Rgb::WHITE);
-        let mut scattered: Option<Scattered> = None;
-        let (mut count, mut medium) = (0, None);
+        let (mut direction, mut throughput, mut medium) = (direction, Rgb::WHITE, None);
         for met in 0..MOST_MET {
             numbers.jump(PAIRS * u64::from(met + 1));
             let wo = -direction;
             if let Some(coefficient) = scene.medium_before(&hit, medium) {
                 throughput = throughput * attenuated(coefficient, hit.t);
             }
-            // Behind a wide spread of directions only means count.
-            let look = match scattered {
-                None => Look::Display,
-                Some(s) if s.density > NARROW => Look::Plain,
-                Some(_) => Look::Patch,
+            sight.lights += throughput * scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
+            let vertex = Vertex::new(scene, &hit, patch, wo, Look::Display);
+            let event = numbers.single();
+            let way = match vertex.step(wo, event, || numbers.pair()) {
+                Step::End => break,
+                Step::Scatter(factor) => {
+                    sight.point = Some(Point { vertex, wo, throughput: throughput * factor });
+                    break;
+                }
+                Step::On(way) => way,
             };
+            (throughput, medium) = (throughput * way.factor, way.medium);
+            let triangle = scene.triangle_of(patch);
+            let Some(next) = scene.leave(triangle, way.side, vertex.point, way.direction) else {
+                sight.lights += throughput * sky(way.direction);
+                break;
+            };
+            let Some(there) = scene.patch_of(&next) else { break };
+            (hit, patch, direction) = (next, there, way.direction);
+        }
+        sight
+    }
+
+    /// Light straight from what emits that a point reflects to the eye, and the lamp that it comes from.
+    pub fn lit(&self, point: &Point, shadows: Shadows, numbers: &mut PixelSample) -> (Rgb, Option<usize>) {
+        numbers.jump(PAIRS * u64::from(MOST_MET + 1));
+        let (light, lamp) =
+            direct(self.scene, &self.lights, &point.vertex, point.wo, Part::Whole, shadows, || numbers.pair());
+        (point.throughput * light, lamp)
+    }
+
+    /// Traces the gather ray of a point; `u` chooses its direction. `None` where the BRDF's choice is below the surface.
+    pub fn gather(&self, point: &Point, u: [f64; 2], shadows: Shadows, numbers: &mut PixelSample) -> Option<Gathered> {
+        let Vertex { geometric, normal, scatter, .. } = &point.vertex;
+        let direction = scatter.brdf.sample(*normal, point.wo, u)?;
+        let density = scatter.brdf.pdf(*normal, point.wo, direction);
+        if !(normal.dot(direction) > 0.0 && density > 0.0 && geometric.dot(direction) > 0.0) {
+            return None;
+        }
+        let mut gathered = Gathered { direction, density, emitted: Rgb::BLACK, scattered: None, other: Rgb::BLACK };
+        let before = Before { point: point.vertex.point, density, distance: 0.0, lit: Some(shadows) };
+        self.follow(&point.vertex, before, direction, numbers, &mut gathered);
+        Some(gathered)
+    }
+
+    /// Follows a path from `vertex`, which scattered it into `direction`, and adds up the radiance that comes back.
+    fn follow(
+        &self,
+        vertex: &Vertex,
+        before: Before<'_>,
+        direction: DVec3,
+        numbers: &mut PixelSample,
+        gathered: &mut Gathered,
+    ) {
+        let scene = self.scene;
+        let own = self.shadows();
+        let (mut before, mut direction, mut throughput) = (before, direction, Rgb::WHITE);
+        let (mut point, mut side) = (vertex.point, vertex.geometric);
+        let mut triangle = scene.triangle_of(vertex.patch);
+        let (mut count, mut medium) = (1, None);
+        // Whatever is found behind the first surface is its scattered light, if it scatters at all.
+        let mut first: Option<(DVec3, DVec3)> = None;
+        let mut radiance = Rgb::BLACK;
+        for met in 0..MOST_MET {
+            numbers.jump(PAIRS * u64::from(MOST_MET + 2 + met));
+            let Some(hit) = scene.leave(triangle, side, point, direction) else {
+                if let Some(sky) = scene.environment() {
+                    let weight = self.weight(&before, |by| self.lights.sky_density_by(by.choice, direction));
+                    let light = throughput * sky.radiance(direction) * weight;
+                    *(if met == 0 { &mut gathered.emitted } else { &mut radiance }) += light;
+                }
+                break;
+            };
+            let Some(patch) = scene.patch_of(&hit) else { break };
+            before.distance += hit.t;
+            if let Some(coefficient) = scene.medium_before(&hit, medium) {
+                throughput = throughput * attenuated(coefficient, hit.t);
+            }
+            let wo = -direction;
+            // Behind a wide spread of directions only means count.
+            let look = if before.density > NARROW { Look::Plain } else { Look::Patch };
             let vertex = Vertex::new(scene, &hit, patch, wo, look);
             let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
             if !emitted.is_black() {
-                let weight = self.weight(&scattered, |s| self.lights.density(s.point, patch, vertex.point));
-                found.add(throughput * emitted * weight, scattered.is_none(), count);
+                let density = |by: Shadows| self.lights.density_by(by.choice, before.point, patch, vertex.point);
+                let light = throughput * emitted * self.weight(&before, density);
+                *(if met == 0 { &mut gathered.emitted } else { &mut radiance }) += light;
             }
             let event = numbers.pair();
-            let (next, side) = match vertex.step(wo, event[0], || numbers.pair()) {
+            match vertex.step(wo, event[0], || numbers.pair()) {
                 Step::End => break,
                 Step::On(way) => {
                     throughput = throughput * way.factor;
-                    if let Some(s) = &mut scattered {
-                        s.lit &= way.straight;
-                    }
-                    medium = way.medium;
-                    (way.direction, way.side)
+                    before.lit = before.lit.filter(|_| way.straight);
+                    (direction, side, medium) = (way.direction, way.side, way.medium);
                 }
                 Step::Scatter(factor) => {
                     throughput *= factor;
-                    let Some(part) =
-                        self.part(&vertex, &hit, wo, &scattered, count, &mut throughput, event[1], &mut found)
-                    else {
+                    if met == 0 {
+                        first = Some((vertex.point, vertex.geometric));
+                    }
+                    let read = self.read(&vertex, &hit, wo, &before, count, event[1]);
+                    radiance += throughput * read.radiance;
+                    let Some((part, factor)) = read.part else { break };
+                    throughput *= factor;
+                    let u = numbers.pair();
+                    let (light, _) = direct(scene, &self.lights, &vertex, wo, part, own, || numbers.pair());
+                    radiance += throughput * light;
+                    let Vertex { geometric, normal, scatter, .. } = &vertex;
+                    let Some(next) = part.sample(&scatter.brdf, *normal, wo, u) else { break };
+                    let (cosine, density) = (normal.dot(next), part.pdf(&scatter.brdf, *normal, wo, next));
+                    if !(cosine > 0.0 && density > 0.0 && geometric.dot(next) > 0.0) {
                         break;
-                    };
-                    let Some(next) = self.scatter(&vertex, wo, part, numbers, &mut throughput, &mut found, count)
-                    else {
-                        break;
-                    };
+                    }
+                    throughput = throughput * part.eval(&scatter.brdf, *normal, next, wo) * (cosine / density);
                     count += 1;
-                    medium = None;
-                    let density = part.pdf(&vertex.scatter.brdf, vertex.normal, wo, next);
-                    scattered = Some(Scattered { point: vertex.point, density, distance: 0.0, lit: true });
-                    (next, vertex.geometric)
+                    before = Before { point: vertex.point, density, distance: 0.0, lit: Some(own) };
+                    (direction, side, medium) = (next, *geometric, None);
                 }
-            };
+            }
             if throughput.is_black() {
                 break;
             }
-            let triangle = scene.triangle_of(vertex.patch);
-            let Some(there) = scene.leave(triangle, side, vertex.point, next) else {
-                if let Some(sky) = scene.environment() {
-                    let weight = self.weight(&scattered, |_| self.lights.sky_density(next));
-                    found.add(throughput * sky.radiance(next) * weight, scattered.is_none(), count);
-                }
-                break;
-            };
-            let Some(patch_there) = scene.patch_of(&there) else { break };
-            if let Some(s) = &mut scattered {
-                s.distance += there.t;
-            }
-            (hit, patch, direction) = (there, patch_there, next);
+            (point, triangle) = (vertex.point, scene.triangle_of(patch));
         }
-        found
-    }
-
-    /// Weight of what a path met that a shadow ray of density `light` could have found.
-    fn weight(&self, scattered: &Option<Scattered>, light: impl Fn(&Scattered) -> f64) -> f64 {
-        match scattered {
-            Some(s) if s.lit => s.density / (s.density + f64::from(self.candidates) * light(s)),
-            _ => 1.0,
+        match first {
+            Some((point, normal)) => gathered.scattered = Some((radiance, point, normal)),
+            None => gathered.other = radiance,
         }
     }
 
-    /// Which part of the BRDF is to be traced at a point that scatters: all of it where no patch may be seen. Elsewhere
-    /// the base's reflection is taken from the solution, and the lobe's is traced, with the probability of its share.
-    fn part(
-        &self,
-        vertex: &Vertex,
-        hit: &SurfaceHit,
-        wo: DVec3,
-        scattered: &Option<Scattered>,
-        count: u32,
-        throughput: &mut Rgb,
-        u: f64,
-        found: &mut Found,
-    ) -> Option<Part> {
+    /// Weight of what a path met that a shadow ray could have found with density `light`.
+    fn weight(&self, before: &Before, light: impl Fn(Shadows) -> f64) -> f64 {
+        match before.lit {
+            Some(by) => before.density / (before.density + f64::from(by.candidates) * light(by)),
+            None => 1.0,
+        }
+    }
+
+    /// What the solution tells of a point, and which part of the BRDF is to be traced: all of it where the point is too
+    /// near for patches to look even. Elsewhere the base's reflection is the solution's, and the lobe's is traced, with
+    /// the probability of its share.
+    fn read(&self, vertex: &Vertex, hit: &SurfaceHit, wo: DVec3, before: &Before, count: u32, u: f64) -> Read {
         let last = count >= MOST_SCATTERED;
-        let Some(before) = scattered else { return Some(Part::Whole) };
         let side = self.scene.cell_area(vertex.patch).sqrt();
         if before.distance < SHORT * side && !last {
-            return Some(Part::Whole);
+            return Read { radiance: Rgb::BLACK, part: Some((Part::Whole, 1.0)) };
         }
         let brdf = &vertex.scatter.brdf;
         let cosine = vertex.normal.dot(wo).max(0.0);
-        let irradiance = if before.density > NARROW {
-            self.reconstruction.smooth(vertex.patch, hit).irradiance
-        } else {
-            self.solution.irradiance(vertex.patch)
+        let irradiance = match before.density > NARROW {
+            true => self.reconstruction.smooth(vertex.patch, hit).irradiance,
+            false => self.irradiance(vertex.patch),
         };
         let lobe = brdf.lobe_albedo(cosine);
         let base = brdf.base_reflectance(cosine);
-        let read = if last { base + lobe } else { base };
-        found.indirect += *throughput * irradiance * read / PI;
+        let radiance = irradiance * (if last { base + lobe } else { base }) / PI;
         if last || lobe.is_black() {
-            return None;
+            return Read { radiance, part: None };
         }
-        let survival = (*throughput * lobe).max_channel().clamp(0.05, 1.0);
-        *throughput *= 1.0 / survival;
-        (u < survival).then_some(Part::Lobe)
+        let survival = lobe.max_channel().clamp(LEAST_SURVIVAL, 1.0);
+        Read { radiance, part: (u < survival).then_some((Part::Lobe, 1.0 / survival)) }
     }
 
-    /// Light straight from what emits, and the direction in which the path goes on.
-    fn scatter(
-        &self,
-        vertex: &Vertex,
-        wo: DVec3,
-        part: Part,
-        numbers: &mut PixelSample,
-        throughput: &mut Rgb,
-        found: &mut Found,
-        count: u32,
-    ) -> Option<DVec3> {
-        let u = numbers.pair();
-        let light = direct(self.scene, &self.lights, vertex, wo, part, self.candidates, || numbers.pair());
-        found.add(*throughput * light, false, count + 1);
-        let Vertex { geometric, normal, scatter, .. } = vertex;
-        let next = part.sample(&scatter.brdf, *normal, wo, u)?;
-        let (cosine, density) = (normal.dot(next), part.pdf(&scatter.brdf, *normal, wo, next));
-        if !(cosine > 0.0 && density > 0.0 && geometric.dot(next) > 0.0) {
-            return None;
-        }
-        *throughput = *throughput * part.eval(&scatter.brdf, *normal, next, wo) * (cosine / density);
-        Some(next)
+    fn irradiance(&self, patch: PatchId) -> Rgb {
+        self.solution.irradiance(patch)
     }
 }
 
-/// What a path brought.
-#[derive(Clone, Copy, Debug, Default)]
-struct Found {
-    /// What emits and was seen, in mirrors and through glass too.
-    lights: Rgb,
-    /// What the first point that scatters reflects of light straight from what emits.
-    direct: Rgb,
-    /// All other.
-    indirect: Rgb,
-}
-
-impl Found {
-    /// Adds light that was met after `count` points that scattered.
-    fn add(&mut self, light: Rgb, seen: bool, count: u32) {
-        let to = match (seen, count) {
-            (true, _) => &mut self.lights,
-            (false, 1) => &mut self.direct,
-            _ => &mut self.indirect,
-        };
-        *to += light;
-    }
+/// What is read of the solution, and the part of a BRDF that is traced, with one over the probability of that.
+struct Read {
+    radiance: Rgb,
+    part: Option<(Part, f64)>,
 }

@@ -8,6 +8,6 @@ pub mod sobol;
 pub mod stream;
 pub mod warp;
 
-pub use pixel::PixelSample;
+pub use pixel::{PixelSample, net_point};
 pub use sobol::{Sobol, SobolBlock};
 pub use stream::Stream;

@@ -28,9 +28,8 @@ impl PixelSample {
         let key = mix(self.key.wrapping_add(self.pair.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
         let other = mix(key);
         let index = owen_scramble(self.index.reverse_bits(), key as u32);
-        let unit = |digits: u32, scramble: u32| {
-            f64::from(owen_scramble(digits, scramble)) * (1.0 / (1u64 << 32) as f64)
-        };
+        let unit =
+            |digits: u32, scramble: u32| f64::from(owen_scramble(digits, scramble)) * (1.0 / (1u64 << 32) as f64);
         [unit(index, (key >> 32) as u32), unit(pascal(index), other as u32)]
     }
 
@@ -45,6 +44,16 @@ impl PixelSample {
     pub fn jump(&mut self, pair: u64) {
         self.pair = pair;
     }
+}
+
+/// Point `index` of the sequence `key`, each coordinate in [0, 1): of 2ᵏ points from a multiple of 2ᵏ on, one lies in
+/// every elementary interval of area 2⁻ᵏ. The order is that of the index, for those who deal the points out themselves.
+#[inline]
+pub fn net_point(key: u64, index: u32) -> [f64; 2] {
+    let key = mix(key);
+    let unit =
+        |digits: u32, scramble: u64| f64::from(owen_scramble(digits, scramble as u32)) * (1.0 / (1u64 << 32) as f64);
+    [unit(index, key), unit(pascal(index), key >> 32)]
 }
 
 /// The digits of the second Sobol dimension, first one lowest: Pascal's triangle modulo 2 times those of the index.

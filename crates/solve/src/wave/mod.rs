@@ -325,7 +325,12 @@ impl WaveContext<'_> {
                 let squares = |end: u32, power: Rgb| Shot::patch(end).map_or([0.0; 2], |p| witness.squares(p, power));
                 let [a, b] = [squares(shot.far, on_far), squares(shot.shooter, on_shooter)];
                 let squares = [a[0] + b[0], a[1] + b[1]];
-                fit.observe(squares, here.density + there.density, parts(shot.shooter, &here, stop), parts(shot.far, &there, other_stop));
+                fit.observe(
+                    squares,
+                    here.density + there.density,
+                    parts(shot.shooter, &here, stop),
+                    parts(shot.far, &there, other_stop),
+                );
             }
         }
     }

@@ -1,0 +1,209 @@
+//! Pixels that share their gather rays.
+//!
+//! Neighbouring pixels see points of one surface, and what one's gather ray found lights the others nearly as well: each
+//! takes the far ends of all, weighed by the balance heuristic over all of their densities (Bekaert, Sbert, Halton,
+//! "Accelerating path tracing by re-using paths", EGWR 2002). Far ends must be far away against the tile, for what lies
+//! between is looked at from one of the points alone; nearer ones serve their own pixel only. Light straight from
+//! lamps, textures and normals stay each pixel's own. Gather directions are even over a tile and its samples.
+
+use glam::DVec3;
+use twinray_scene::Rgb;
+use twinray_scene::sample::stream::mix;
+use twinray_scene::sample::{PixelSample, net_point};
+
+use super::sample::{Estimator, Gathered, Point, Sight};
+use crate::direct::Shadows;
+use crate::film::Seen;
+
+/// Pixels along a side of a tile.
+pub(super) const SIDE: usize = 4;
+/// Pixels of a tile.
+pub(super) const PIXELS: usize = SIDE * SIDE;
+/// Far ends count as far from so many times the distance between the points that share them.
+const FAR: f64 = 4.0;
+/// Cosine between normals of points that share.
+const SAME_NORMAL: f64 = 0.85;
+/// Rise over run of points that share.
+const SAME_PLANE: f64 = 0.2;
+
+/// A pixel's sample while its tile is at work.
+#[derive(Clone, Copy, Debug, Default)]
+struct Work {
+    sight: Sight,
+    gathered: Option<Gathered>,
+    direct: Rgb,
+    indirect: Rgb,
+}
+
+/// The pixels of a tile: their rays, and where sums go.
+pub(super) struct Tile<'t> {
+    /// Number of the tile on the whole film.
+    pub number: u64,
+    /// Number of every pixel on the whole film, and its slot in the tile.
+    pub pixels: &'t [(u64, usize)],
+    pub seed: u64,
+}
+
+impl Tile<'_> {
+    /// Sample `k` of every pixel: `ray` gives a camera ray of the world. Adds to `seen`; `learn` is told what which
+    /// lamp gave.
+    pub fn sample(
+        &self,
+        estimator: &Estimator,
+        k: u32,
+        shadows: Shadows,
+        ray: impl Fn(usize, &mut PixelSample) -> (DVec3, DVec3),
+        seen: &mut [Seen],
+        mut learn: impl FnMut(usize, f64),
+    ) {
+        let mut work = [Work::default(); PIXELS];
+        for (n, &(pixel, slot)) in self.pixels.iter().enumerate() {
+            let mut numbers = PixelSample::new(self.seed, pixel, k);
+            let (origin, direction) = ray(n, &mut numbers);
+            let work = &mut work[n];
+            work.sight = estimator.look(origin, direction, &mut numbers);
+            let Some(point) = &work.sight.point else { continue };
+            let (light, lamp) = estimator.lit(point, shadows, &mut numbers);
+            work.direct = light;
+            if let Some(lamp) = lamp {
+                learn(lamp, light.luminance());
+            }
+            let u = net_point(mix(self.seed ^ mix(self.number ^ 0x7113_5EED)), dealt(k, slot));
+            work.gathered = estimator.gather(point, u, shadows, &mut numbers);
+        }
+        self.share(&mut work);
+        for (work, seen) in work.iter().zip(seen) {
+            add(work, seen);
+        }
+    }
+
+    /// Turns what was gathered into light that reaches the eye.
+    fn share(&self, work: &mut [Work; PIXELS]) {
+        let mut open: u32 = (1 << self.pixels.len()) - 1;
+        while open != 0 {
+            let leader = open.trailing_zeros() as usize;
+            open &= !(1 << leader);
+            let Some(point) = work[leader].sight.point else { continue };
+            let (mut group, mut reach) = (1u32 << leader, 0.0f64);
+            for n in (0..self.pixels.len()).filter(|n| open >> n & 1 == 1) {
+                let Some(other) = &work[n].sight.point else { continue };
+                let offset = other.vertex.point - point.vertex.point;
+                let rise = offset.dot(point.vertex.geometric).abs().max(offset.dot(other.vertex.geometric).abs());
+                let alike = point.vertex.normal.dot(other.vertex.normal) > SAME_NORMAL;
+                if alike && rise <= SAME_PLANE * offset.length() {
+                    group |= 1 << n;
+                    reach = reach.max(offset.length());
+                }
+            }
+            open &= !group;
+            collect(work, group, reach);
+        }
+    }
+}
+
+/// The point of the tile's sequence that sample `k` of the pixel in `slot` gets: each sample's sixteen points are an even
+/// set, and so are a pixel's own points of sixteen samples.
+///
+/// The low four bits of the index decide the first digits of the first coordinate, and those of the second together with
+/// the next four bits, which are k's: so both A and A + 1 must be invertible where the low bits are slot + A·k over GF(2).
+/// Multiplication by an element of GF(16) other than 0 and 1 is such a map.
+fn dealt(k: u32, slot: usize) -> u32 {
+    let low = k & 15;
+    let turned = (low << 1 ^ if low & 8 != 0 { 0b1_0011 } else { 0 }) & 15;
+    k << 4 | (slot as u32 ^ turned)
+}
+
+/// Members of a group, given as bits.
+fn members(group: u32) -> impl Iterator<Item = usize> + Clone {
+    (0..PIXELS).filter(move |n| group >> n & 1 == 1)
+}
+
+/// Gives every member of a group what the gather rays of all found; points are at most `reach` from each other.
+fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
+    for i in members(group) {
+        let (Some(point), Some(gathered)) = (work[i].sight.point, work[i].gathered) else { continue };
+        let Gathered { direction, density, emitted, scattered, other } = gathered;
+        let own = reflected(&point, direction) / density;
+        work[i].direct += own * emitted;
+        work[i].indirect += own * other;
+        let Some((radiance, end, normal)) = scattered else { continue };
+        let nearest = |n: usize| work[n].sight.point.map_or(f64::INFINITY, |p| p.vertex.point.distance(end));
+        let is_far = members(group).map(nearest).fold(f64::INFINITY, f64::min) > *FARR * reach;
+        if !is_far || group.count_ones() == 1 {
+            work[i].indirect += own * radiance;
+            continue;
+        }
+        if radiance.is_black() {
+            continue;
+        }
+        let (mut gives, mut densities) = ([Rgb::BLACK; PIXELS], 0.0);
+        for j in members(group) {
+            let Some(point) = &work[j].sight.point else { continue };
+            let offset = end - point.vertex.point;
+            let squared = offset.length_squared();
+            let direction = offset / squared.sqrt();
+            let geometry = -normal.dot(direction) / squared;
+            if geometry <= 0.0 || point.vertex.geometric.dot(direction) <= 0.0 {
+                continue;
+            }
+            densities += geometry * point.vertex.scatter.brdf.pdf(point.vertex.normal, point.wo, direction);
+            gives[j] = reflected(point, direction) * geometry;
+        }
+        if densities > 0.0 {
+            for j in members(group) {
+                work[j].indirect += gives[j] * radiance / densities;
+            }
+        }
+    }
+}
+
+/// Factor of what a point reflects to the eye of the radiance from `direction`: throughput · f_r · cosine.
+fn reflected(point: &Point, direction: DVec3) -> Rgb {
+    let cosine = point.vertex.normal.dot(direction).max(0.0);
+    point.throughput * point.vertex.scatter.brdf.eval(point.vertex.normal, direction, point.wo) * cosine
+}
+
+/// Adds a pixel's sample to its sums.
+fn add(work: &Work, seen: &mut Seen) {
+    seen.rays += 1;
+    seen.empty += u32::from(work.sight.empty);
+    let lights = work.sight.lights;
+    let radiance = lights + work.direct + work.indirect;
+    if !radiance.is_finite() {
+        seen.invalid += 1;
+        return;
+    }
+    seen.radiance += radiance;
+    seen.direct += work.direct;
+    seen.lights += lights;
+    if !lights.is_black() {
+        seen.covered += 1;
+    } else if !work.sight.empty {
+        seen.unlit += 1;
+        seen.unlit_luminance += radiance.luminance();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sixteen samples of a pixel, and the sixteen pixels of a sample, lie one in each sixteenth of both coordinates.
+    #[test]
+    fn points_are_dealt_out_evenly() {
+        let even = |points: Vec<[f64; 2]>| {
+            for c in 0..2 {
+                let mut cells: Vec<usize> = points.iter().map(|p| (16.0 * p[c]) as usize).collect();
+                cells.sort_unstable();
+                assert_eq!(cells, (0..16).collect::<Vec<_>>(), "coordinate {c}");
+            }
+        };
+        for key in 0..20 {
+            for fixed in 0..16 {
+                even((0..16).map(|k| net_point(key, dealt(k + 48, fixed))).collect());
+                even((0..16).map(|slot| net_point(key, dealt(fixed as u32, slot))).collect());
+            }
+        }
+    }
+}
+static FARR: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("FAR").map_or(4.0, |s| s.parse().unwrap()));
