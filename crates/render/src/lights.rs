@@ -13,6 +13,11 @@ use twinray_scene::{PatchId, PatchScene, Rgb, Side};
 const MOST_CANDIDATES: u32 = 8;
 /// The most lamps; where there are more, neighbours are one.
 const MOST_LAMPS: usize = 256;
+/// Lamps of more than this share of all power are cut in halves of no less than half so many cells, as long as there are fewer
+/// than so many lamps.
+const LARGE: f64 = 1.0 / 32.0;
+const LEAST_CELLS: usize = 8;
+const PARTS: usize = 64;
 /// Cosine between the normals of triangles that may be of one lamp.
 const ALIKE: f64 = 0.99;
 
@@ -237,8 +242,8 @@ fn ranges(scene: &PatchScene, patches: &[PatchId]) -> Vec<Range<usize>> {
             let last = patches[k - 1];
             let same = scene.triangle_of(last) == scene.triangle_of(patch);
             let next = scene.triangle_of(last) + 1 == scene.triangle_of(patch)
-                && scene.material_of(last) == scene.material_of(patch)
-                && scene.normal(last).dot(scene.normal(patch)) > ALIKE;
+                && scene.normal(last).dot(scene.normal(patch)) > ALIKE
+                && share_an_edge(scene, scene.triangle_of(last), scene.triangle_of(patch));
             same || next
         };
         match ranges.last_mut() {
@@ -249,7 +254,29 @@ fn ranges(scene: &PatchScene, patches: &[PatchId]) -> Vec<Range<usize>> {
     while ranges.len() > MOST_LAMPS {
         ranges = ranges.chunks(2).map(|pair| pair[0].start..pair[pair.len() - 1].end).collect();
     }
+    // Large lamps are seen in part from many places.
+    let power = |range: &Range<usize>| -> f64 {
+        patches[range.clone()].iter().map(|&p| scene.cell_area(p) * scene.emission(p).luminance()).sum()
+    };
+    let total = power(&(0..patches.len()));
+    while ranges.len() < PARTS {
+        let is_large = |r: &Range<usize>| r.len() >= LEAST_CELLS && power(r) > LARGE * total;
+        if !ranges.iter().any(is_large) {
+            break;
+        }
+        let halves = |r: Range<usize>| match is_large(&r) {
+            true => vec![r.start..r.start + r.len() / 2, r.start + r.len() / 2..r.end],
+            false => vec![r],
+        };
+        ranges = ranges.into_iter().flat_map(halves).collect();
+    }
     ranges
+}
+
+/// True if two triangles have two corners in common.
+fn share_an_edge(scene: &PatchScene, a: u32, b: u32) -> bool {
+    let (a, b) = (scene.corners(a), scene.corners(b));
+    a.iter().filter(|p| b.contains(p)).count() == 2
 }
 
 #[cfg(test)]

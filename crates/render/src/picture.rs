@@ -13,7 +13,7 @@ use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Part, Shadows, direct};
+use crate::direct::{Part, Shadows, direct, power_heuristic};
 use crate::image::Image;
 use crate::lights::Lights;
 use crate::reconstruct::Reconstruction;
@@ -224,7 +224,7 @@ impl View<'_> {
                 Step::On(way) => way,
             };
             (throughput, medium) = (throughput * way.factor, way.medium);
-            let Some(next) = scene.leave(scene.triangle_of(patch), way.side, vertex.point, way.direction) else {
+            let Some(next) = vertex.next(scene, way.beyond, way.direction) else {
                 return (Rgb::BLACK, emitted + throughput * sky(way.direction));
             };
             let Some(there) = scene.patch_of(&next) else { return (Rgb::BLACK, emitted) };
@@ -273,7 +273,7 @@ impl View<'_> {
         let Some(wi) = brdf.lobe_sample(*n, wo, u).filter(above) else { return nothing };
         let density = brdf.lobe_pdf(*n, wo, wi);
         let weight = brdf.lobe_eval(*n, wi, wo) * (n.dot(wi) / density);
-        let balanced = |other: f64| density / (density + f64::from(LAMPS) * other);
+        let balanced = |other: f64| power_heuristic(density, f64::from(LAMPS) * other);
         let Some(far) = scene.trace_from(*patch, *point, wi) else {
             let sky = weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi));
             return match &self.lamps {

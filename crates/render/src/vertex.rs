@@ -36,8 +36,8 @@ pub(crate) enum Look {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way {
     pub direction: DVec3,
-    /// Geometric normal on the side to which it leaves.
-    pub side: DVec3,
+    /// Whether it goes on beyond the surface.
+    pub beyond: bool,
     /// What the path is multiplied by.
     pub factor: Rgb,
     /// What attenuates it, 1/m.
@@ -76,6 +76,15 @@ impl Vertex {
         Self { patch, point, geometric, normal, scatter, inside: hit.side == Side::Back }
     }
 
+    /// The first surface on the way in `direction`, on this side or `beyond`.
+    pub fn next(&self, scene: &PatchScene, beyond: bool, direction: DVec3) -> Option<SurfaceHit> {
+        let triangle = scene.triangle_of(self.patch);
+        match beyond {
+            true => scene.beyond(triangle, self.geometric, self.point, direction),
+            false => scene.leave(triangle, self.geometric, self.point, direction),
+        }
+    }
+
     /// Chooses what happens to a path that came from `wo`; `event` is uniform, and so is `blur`, which is used where
     /// transmission is rough.
     pub fn step(&self, wo: DVec3, event: f64, blur: impl FnOnce() -> [f64; 2]) -> Step {
@@ -94,7 +103,7 @@ impl Vertex {
                 let smooth = mirrored(self.normal, wo);
                 let direction = if smooth.dot(self.geometric) > 0.0 { smooth } else { mirrored(self.geometric, wo) };
                 let medium = specular.attenuation().filter(|_| self.inside);
-                Step::On(Way { direction, side: self.geometric, factor, medium, straight: false })
+                Step::On(Way { direction, beyond: false, factor, medium, straight: false })
             }
             Event::Transmit => {
                 let Some((direction, weight)) = specular.refract_rough(self.normal, wo, self.inside, blur()) else {
@@ -105,7 +114,7 @@ impl Vertex {
                 }
                 let medium = specular.attenuation().filter(|_| !self.inside);
                 let straight = specular.is_pane();
-                Step::On(Way { direction, side: -self.geometric, factor: factor * weight, medium, straight })
+                Step::On(Way { direction, beyond: true, factor: factor * weight, medium, straight })
             }
         }
     }

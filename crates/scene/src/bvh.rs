@@ -99,6 +99,13 @@ impl PatchScene {
         })
     }
 
+    /// The first surface beyond `point` on the triangle `own` that a ray through it meets; `normal` is the triangle's, on the
+    /// side that the ray comes from. What lies in the same place is met at once: glass may stand against a wall.
+    #[inline]
+    pub fn beyond(&self, own: u32, normal: DVec3, point: DVec3, direction: DVec3) -> Option<SurfaceHit> {
+        self.closest(self.lifted(point, normal), direction, own)
+    }
+
     /// The patch of a hit; `None` on the absorbing back of a one-sided surface.
     #[inline]
     pub fn patch_of(&self, hit: &SurfaceHit) -> Option<PatchId> {

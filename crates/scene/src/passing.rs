@@ -102,11 +102,11 @@ impl PatchScene {
             let choices = specular.choices(cosine, inside, rest, true);
             let (event, factor) = choices.choose(random());
             let away = -ray.direction;
-            let (next, side) = match event {
+            let next = match event {
                 Event::Stop => return Arrival { end: End::Patch(patch), stop: choices.stop(), ..ray },
-                Event::Reflect => (mirrored(n, away), n),
+                Event::Reflect => mirrored(n, away),
                 Event::Transmit => match specular.refract(n, away, inside) {
-                    Some(next) => (next, -n),
+                    Some(next) => next,
                     None => return ray,
                 },
             };
@@ -118,7 +118,10 @@ impl PatchScene {
             ray.factor = ray.factor * factor;
             ray.direction = next;
             let from = self.point_of(met.triangle, met.u, met.v);
-            hit = self.leave(met.triangle, side, from, next);
+            hit = match event {
+                Event::Transmit => self.beyond(met.triangle, n, from, next),
+                _ => self.leave(met.triangle, n, from, next),
+            };
         }
         ray
     }

@@ -47,8 +47,8 @@ impl PatchScene {
             }
             gone += met.t;
             let front = self.triangles[met.triangle as usize].normal;
-            let beyond = if front.dot(direction) > 0.0 { front } else { -front };
-            hit = self.leave(met.triangle, beyond, origin + direction * gone, direction);
+            let before = if front.dot(direction) > 0.0 { -front } else { front };
+            hit = self.beyond(met.triangle, before, origin + direction * gone, direction);
         }
         Rgb::BLACK
     }

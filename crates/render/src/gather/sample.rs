@@ -9,7 +9,7 @@ use twinray_scene::sample::PixelSample;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Part, Shadows, direct};
+use crate::direct::{Part, Shadows, direct, power_heuristic};
 use crate::lights::Lights;
 use crate::picture::first_side;
 use crate::reconstruct::Reconstruction;
@@ -121,8 +121,7 @@ impl<'a> Estimator<'a> {
                 Step::On(way) => way,
             };
             (throughput, medium) = (throughput * way.factor, way.medium);
-            let triangle = scene.triangle_of(patch);
-            let Some(next) = scene.leave(triangle, way.side, vertex.point, way.direction) else {
+            let Some(next) = vertex.next(scene, way.beyond, way.direction) else {
                 sight.lights += throughput * sky(way.direction);
                 break;
             };
@@ -166,15 +165,14 @@ impl<'a> Estimator<'a> {
         let scene = self.scene;
         let own = self.shadows();
         let (mut before, mut direction, mut throughput) = (before, direction, Rgb::WHITE);
-        let (mut point, mut side) = (vertex.point, vertex.geometric);
-        let mut triangle = scene.triangle_of(vertex.patch);
+        let (mut from, mut beyond) = (*vertex, false);
         let (mut count, mut medium) = (1, None);
         // Whatever is found behind the first surface is its scattered light, if it scatters at all.
         let mut first: Option<(DVec3, DVec3)> = None;
         let mut radiance = Rgb::BLACK;
         for met in 0..MOST_MET {
             numbers.jump(PAIRS * u64::from(MOST_MET + 2 + met));
-            let Some(hit) = scene.leave(triangle, side, point, direction) else {
+            let Some(hit) = from.next(scene, beyond, direction) else {
                 if let Some(sky) = scene.environment() {
                     let weight = self.weight(&before, |by| self.lights.sky_density_by(by.choice, direction));
                     let light = throughput * sky.radiance(direction) * weight;
@@ -203,7 +201,7 @@ impl<'a> Estimator<'a> {
                 Step::On(way) => {
                     throughput = throughput * way.factor;
                     before.lit = before.lit.filter(|_| way.straight);
-                    (direction, side, medium) = (way.direction, way.side, way.medium);
+                    (direction, beyond, medium) = (way.direction, way.beyond, way.medium);
                 }
                 Step::Scatter(factor) => {
                     throughput *= factor;
@@ -226,13 +224,13 @@ impl<'a> Estimator<'a> {
                     throughput = throughput * part.eval(&scatter.brdf, *normal, next, wo) * (cosine / density);
                     count += 1;
                     before = Before { point: vertex.point, density, distance: 0.0, lit: Some(own) };
-                    (direction, side, medium) = (next, *geometric, None);
+                    (direction, beyond, medium) = (next, false, None);
                 }
             }
             if throughput.is_black() {
                 break;
             }
-            (point, triangle) = (vertex.point, scene.triangle_of(patch));
+            from = vertex;
         }
         match first {
             Some((point, normal)) => gathered.scattered = Some((radiance, point, normal)),
@@ -243,7 +241,7 @@ impl<'a> Estimator<'a> {
     /// Weight of what a path met that a shadow ray could have found with density `light`.
     fn weight(&self, before: &Before, light: impl Fn(Shadows) -> f64) -> f64 {
         match before.lit {
-            Some(by) => before.density / (before.density + f64::from(by.candidates) * light(by)),
+            Some(by) => power_heuristic(before.density, f64::from(by.candidates) * light(by)),
             None => 1.0,
         }
     }

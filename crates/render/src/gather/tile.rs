@@ -128,7 +128,7 @@ fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
         work[i].indirect += own * other;
         let Some((radiance, end, normal)) = scattered else { continue };
         let nearest = |n: usize| work[n].sight.point.map_or(f64::INFINITY, |p| p.vertex.point.distance(end));
-        let is_far = members(group).map(nearest).fold(f64::INFINITY, f64::min) > *FARR * reach;
+        let is_far = members(group).map(nearest).fold(f64::INFINITY, f64::min) > FAR * reach;
         if !is_far || group.count_ones() == 1 {
             work[i].indirect += own * radiance;
             continue;
@@ -206,4 +206,3 @@ mod tests {
         }
     }
 }
-static FARR: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("FAR").map_or(4.0, |s| s.parse().unwrap()));

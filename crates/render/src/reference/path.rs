@@ -77,13 +77,13 @@ impl<'a> PathTracer<'a> {
         let mut lit = false;
         let mut look = Look::Display;
         for bounce in 1u32.. {
-            let (direction, side, medium) =
+            let (direction, beyond, medium) =
                 match vertex.step(wo, random.uniform(), || [random.uniform(), random.uniform()]) {
                     Step::End => break,
                     Step::On(way) => {
                         throughput = throughput * way.factor;
                         lit &= way.straight;
-                        (way.direction, way.side, way.medium)
+                        (way.direction, way.beyond, way.medium)
                     }
                     Step::Scatter(factor) => {
                         throughput *= factor;
@@ -97,7 +97,7 @@ impl<'a> PathTracer<'a> {
                         }
                         throughput = throughput * scatter.brdf.eval(*normal, wi, wo) * (cosine / density);
                         (scattered, lit, look) = (Some((*point, density)), true, Look::Plain);
-                        (wi, *geometric, None)
+                        (wi, false, None)
                     }
                 };
             if throughput.is_black() {
@@ -108,8 +108,7 @@ impl<'a> PathTracer<'a> {
                 // Whoever looks through shadow rays alone would miss what only paths find.
                 _ => 1.0,
             };
-            let triangle = scene.triangle_of(vertex.patch);
-            let Some(hit) = scene.leave(triangle, side, vertex.point, direction) else {
+            let Some(hit) = vertex.next(scene, beyond, direction) else {
                 if let Some(sky) = scene.environment() {
                     let light = throughput * sky.radiance(direction) * weight(&|_| self.lights.sky_density(direction));
                     found.add(light, scattered.is_none());
