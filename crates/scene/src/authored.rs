@@ -1,11 +1,11 @@
-//! What an author wrote: meshes, instances, materials, textures, cameras, surroundings.
+//! What an author wrote: meshes, instances, materials, textures, cameras, lights, surroundings.
 //!
 //! Plain public data, filled by the readers of `twinray-format` and by `builtin`. Nothing is computed here:
 //! `validate` finds faults, `patch` turns a scene into world-space patches. The solver never sees these types.
 
 use std::sync::Arc;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use crate::camera::Camera;
 use crate::rgb::Rgb;
@@ -27,6 +27,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Light that comes from infinitely far away; `None` is black.
     pub environment: Option<Environment>,
+    /// Lights without area.
+    pub lights: Vec<PunctualLight>,
     /// How many patches the scene's author suggests; the command's `--patches` overrides it.
     pub suggested_patches: Option<usize>,
 }
@@ -239,4 +241,119 @@ pub struct TextureImage {
 pub enum Environment {
     /// The same radiance from every direction.
     Uniform(Rgb),
+    /// A picture of all directions.
+    Map(EnvironmentMap),
+    /// The sky of a formula, with or without the sun.
+    Sky(Sky),
+}
+
+/// A picture of all directions, as light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentMap {
+    /// The picture.
+    pub image: Arc<RadianceMap>,
+    /// Turn about +Y, radians, counter-clockwise as seen from above. Without one, the picture's middle lies in +X, what is
+    /// right of it towards +Z, its upper edge in +Y.
+    pub rotation: f64,
+    /// Factor to radiance.
+    pub strength: f64,
+}
+
+/// Radiance in all directions, equirectangular: columns are even in azimuth, rows in the angle from the zenith.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RadianceMap {
+    /// Name for messages.
+    pub name: String,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `[height × width]`, first row at the zenith: linear Rec. 709, finite and at least 0.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// The sky of a formula above a horizon, and the ground below it. Radiance is luminance, in nit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sky {
+    /// How radiance is distributed.
+    pub model: SkyModel,
+    /// Unit, towards the sun; north is −Z, east +X. Must be above the horizon unless the model does without.
+    pub towards_sun: DVec3,
+    /// How bright it is.
+    pub level: SkyLevel,
+    /// Illuminance that the sun gives to what faces it, lx; `None` where clouds hide it.
+    pub sun: Option<Rgb>,
+    /// Albedo of the ground below the horizon, which sky and sun illuminate.
+    pub ground: Rgb,
+}
+
+/// Distributions of radiance over the sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SkyModel {
+    /// The same everywhere.
+    Uniform,
+    /// CIE standard overcast sky.
+    Overcast,
+    /// CIE standard clear sky.
+    Clear,
+    /// Preetham, Shirley, Smits 1999, with colours.
+    Preetham {
+        /// Haze: 2 is very clear, 10 hazy.
+        turbidity: f64,
+    },
+}
+
+/// What scales a sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SkyLevel {
+    /// Luminance of the zenith, nit.
+    Zenith(f64),
+    /// Illuminance of unobstructed level ground by the sky without the sun, lx.
+    Horizontal(f64),
+}
+
+/// A light without area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PunctualLight {
+    /// Name for messages and for the command line.
+    pub name: String,
+    /// Where it shines.
+    pub kind: LightKind,
+    /// Luminous intensity, cd (W·sr⁻¹); of directional lights illuminance across their direction, lx (W·m⁻²). A factor to
+    /// the profile, if there is one.
+    pub intensity: Rgb,
+    /// Light to world. Light leaves along −Z; scale means nothing.
+    pub transform: DAffine3,
+    /// How intensity depends on the direction, instead of the kind, which must then be a point.
+    pub profile: Option<Arc<LightProfile>>,
+}
+
+/// Kinds of lights without area, as `KHR_lights_punctual` has them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Evenly in all directions.
+    Point,
+    /// Evenly within a cone, then falling off to a wider one.
+    Spot {
+        /// Half the angle of the cone that is fully lit, radians.
+        inner: f64,
+        /// Half the angle beyond which there is no light, radians; larger than the inner one and at most π/2.
+        outer: f64,
+    },
+    /// From infinitely far away, the same everywhere.
+    Directional,
+}
+
+/// Measured luminous intensity of a luminaire, type C photometry: γ from the nadir (−Z of the light), C around it, from +X
+/// towards +Y.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightProfile {
+    /// Name for messages.
+    pub name: String,
+    /// γ, degrees, ascending, within 0 to 180; no light beyond the first and the last.
+    pub vertical: Vec<f32>,
+    /// C, degrees, ascending: 0 alone if there is no dependence, else from 0 to 360.
+    pub horizontal: Vec<f32>,
+    /// `[horizontal][vertical]`, cd, at least 0.
+    pub candela: Vec<f32>,
 }

@@ -5,7 +5,7 @@
 //! cameras, vertex normals and textures beyond the patches' means (for display only), and where the scene lies in
 //! the world. Called by whoever writes or checks stored light.
 
-use crate::authored::{Environment, Opacity, Surface, TextureImage};
+use crate::authored::{Environment, Opacity, SkyLevel, SkyModel, Surface, TextureImage};
 use crate::cells::Cells;
 use crate::patch::{PatchScene, Triangle, base_texel};
 use crate::rgb::Rgb;
@@ -37,13 +37,7 @@ impl PatchScene {
             // Vertices and cells give the area, but for the part of it that holes leave.
             hash.double(self.area(patch));
         }
-        match self.environment.as_ref().map(|e| e.environment()) {
-            None => hash.word(0),
-            Some(Environment::Uniform(radiance)) => {
-                hash.word(1);
-                hash.color(*radiance);
-            }
-        }
+        hash.surroundings(self.environment.as_ref().map(|e| e.environment()));
         hash.0
     }
 
@@ -111,6 +105,43 @@ impl Hash {
         }
     }
 
+    fn surroundings(&mut self, environment: Option<&Environment>) {
+        match environment {
+            None => self.word(0),
+            Some(Environment::Uniform(radiance)) => {
+                self.word(1);
+                self.color(*radiance);
+            }
+            Some(Environment::Map(map)) => {
+                self.word(2);
+                self.word(u64::from(map.image.width));
+                map.image.pixels.iter().for_each(|p| self.floats(p));
+                self.double(map.rotation);
+                self.double(map.strength);
+            }
+            Some(Environment::Sky(sky)) => {
+                self.word(3);
+                let (model, turbidity) = match sky.model {
+                    SkyModel::Uniform => (0, 0.0),
+                    SkyModel::Overcast => (1, 0.0),
+                    SkyModel::Clear => (2, 0.0),
+                    SkyModel::Preetham { turbidity } => (3, turbidity),
+                };
+                self.word(model);
+                self.double(turbidity);
+                sky.towards_sun.to_array().iter().for_each(|x| self.double(*x));
+                let (kind, value) = match sky.level {
+                    SkyLevel::Zenith(luminance) => (0, luminance),
+                    SkyLevel::Horizontal(illuminance) => (1, illuminance),
+                };
+                self.word(kind);
+                self.double(value);
+                self.color(sky.sun.unwrap_or(Rgb::BLACK));
+                self.color(sky.ground);
+            }
+        }
+    }
+
     /// What a material does beside its base colour, which the patches hold.
     fn lobe(&mut self, t: &Triangle, surface: &Surface) {
         match surface {
@@ -138,7 +169,7 @@ mod tests {
     use glam::{DAffine3, DVec3};
 
     use super::*;
-    use crate::authored::{Scene, Texel, TextureRef, Wrap};
+    use crate::authored::{EnvironmentMap, RadianceMap, Scene, Sky, Texel, TextureRef, Wrap};
     use crate::builtin;
     use crate::patch::{PatchBudget, PatchOptions};
 
@@ -172,6 +203,22 @@ mod tests {
         });
         shows("the order of instances", &base, |s| s.instances.swap(0, 1));
         shows("the sky", &base, |s| s.environment = Some(Environment::Uniform(Rgb::grey(1.0))));
+        let (high, low) =
+            (Sky::natural(SkyModel::Clear, Some([50.0, 90.0])), Sky::natural(SkyModel::Clear, Some([40.0, 90.0])));
+        let mut under_the_sky = base.clone();
+        under_the_sky.environment = Some(Environment::Sky(high.clone()));
+        shows("the sun's place", &under_the_sky, |s| s.environment = Some(Environment::Sky(low)));
+        shows("the ground", &under_the_sky, |s| {
+            s.environment = Some(Environment::Sky(Sky { ground: Rgb::BLACK, ..high }))
+        });
+        let map = |green: f32, rotation: f64| {
+            let pixels = vec![[1.0, green, 0.5]; 2];
+            let image = Arc::new(RadianceMap { name: String::new(), width: 2, height: 1, pixels });
+            Some(Environment::Map(EnvironmentMap { image, rotation, strength: 1.0 }))
+        };
+        under_the_sky.environment = map(1.0, 0.0);
+        shows("a pixel of the map", &under_the_sky, |s| s.environment = map(0.9, 0.0));
+        shows("the map's turn", &under_the_sky, |s| s.environment = map(1.0, 0.1));
         shows("the second side", &base, |s| s.materials[0].two_sided = true);
         for (k, m) in base.materials.iter().enumerate() {
             let other = Surface::Lambertian { reflectance: Texel::constant(Rgb::grey(0.123)) };

@@ -19,8 +19,8 @@ pub mod texture;
 pub mod validate;
 
 pub use authored::{
-    Environment, Instance, Material, Mesh, NormalMap, Opacity, Scene, Surface, Texel, TextureImage, TextureRef,
-    Transmission, Volume, Wrap,
+    Environment, EnvironmentMap, Instance, LightKind, LightProfile, Material, Mesh, NormalMap, Opacity, PunctualLight,
+    RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel, TextureImage, TextureRef, Transmission, Volume, Wrap,
 };
 pub use bvh::SurfaceHit;
 pub use camera::{Camera, Projection};

@@ -2,7 +2,9 @@
 //!
 //! Readers give sound scenes; scenes built by hand go through here before they are cut into patches.
 
-use crate::authored::{Environment, Scene, Surface, Texel, TextureImage, TextureRef};
+use crate::authored::{
+    Environment, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel, TextureImage, TextureRef,
+};
 use crate::rgb::Rgb;
 use crate::texture::srgb_to_linear;
 
@@ -87,13 +89,64 @@ impl Scene {
                 fault(format!("image {i} \"{}\"", image.name), "its size does not match its texels".into());
             }
         }
-        if let Some(Environment::Uniform(radiance)) = &self.environment
-            && !is_radiance(*radiance)
-        {
-            fault("environment".into(), format!("radiance {:?}, {RADIANCE}", radiance.to_array()));
+        if let Some(problem) = self.environment.as_ref().and_then(environment_fault) {
+            fault("environment".into(), problem);
         }
         faults
     }
+}
+
+/// What is wrong with an environment.
+fn environment_fault(environment: &Environment) -> Option<String> {
+    match environment {
+        Environment::Uniform(radiance) => {
+            (!is_radiance(*radiance)).then(|| format!("radiance {:?}, {RADIANCE}", radiance.to_array()))
+        }
+        Environment::Map(map) => {
+            let RadianceMap { name, width, height, pixels } = &*map.image;
+            if pixels.is_empty() || pixels.len() as u64 != u64::from(*width) * u64::from(*height) {
+                return Some(format!("the size of the map \"{name}\" does not match its pixels"));
+            }
+            if !(map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0) {
+                let (rotation, strength) = (map.rotation, map.strength);
+                return Some(format!(
+                    "rotation {rotation} and strength {strength}, expected numbers, the latter at least 0"
+                ));
+            }
+            let wrong = pixels.iter().position(|p| !is_radiance(Rgb::from_f32(*p) * map.strength));
+            wrong.map(|k| {
+                let (x, y) = (k % *width as usize, k / *width as usize);
+                format!("pixel ({x}, {y}) of the map \"{name}\" is {:?}, {RADIANCE}", pixels[k])
+            })
+        }
+        Environment::Sky(sky) => sky_fault(sky),
+    }
+}
+
+fn sky_fault(sky: &Sky) -> Option<String> {
+    let sun = sky.towards_sun;
+    if !sun.is_finite() || (sun.length() - 1.0).abs() > 1e-9 {
+        return Some(format!("the direction {sun} of the sun, expected a unit vector"));
+    }
+    if sun.y <= 0.0 && (sky.sun.is_some() || matches!(sky.model, SkyModel::Clear | SkyModel::Preetham { .. })) {
+        return Some("the sun is below the horizon; expected above it, or an overcast sky without it".into());
+    }
+    if let SkyModel::Preetham { turbidity } = sky.model
+        && !(1.7..=10.0).contains(&turbidity)
+    {
+        return Some(format!("turbidity {turbidity}, expected 1.7 to 10"));
+    }
+    let (SkyLevel::Zenith(level) | SkyLevel::Horizontal(level)) = sky.level;
+    if !(0.0..1e12).contains(&level) {
+        return Some(format!("a sky of {level} nit or lx, {RADIANCE}"));
+    }
+    let ground = sky.ground;
+    if !(ground.min_channel() >= 0.0 && ground.max_channel() <= 1.0) {
+        return Some(format!("the ground's albedo {:?}, expected 0 to 1", ground.to_array()));
+    }
+    let sunlight = sky.sun.unwrap_or(Rgb::BLACK);
+    (!(sunlight.min_channel() >= 0.0 && sunlight.max_channel() < 1e12))
+        .then(|| format!("sunlight of {:?} lx, {RADIANCE}", sunlight.to_array()))
 }
 
 const RADIANCE: &str = "expected 0 or more, and no more than single precision can hold";
@@ -118,7 +171,7 @@ fn textures<'a>(texels: &[&'a Texel]) -> Vec<&'a TextureRef> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::authored::{Instance, Material, Mesh, Wrap};
+    use crate::authored::{EnvironmentMap, Instance, Material, Mesh, Wrap};
     use glam::DAffine3;
     use std::sync::Arc;
 
@@ -139,6 +192,35 @@ mod tests {
         assert_eq!(faults.iter().filter(|f| f.starts_with("mesh 0")).count(), 3);
         assert_eq!(faults.iter().filter(|f| f.starts_with("instance 0")).count(), 1);
         assert_eq!(faults.iter().filter(|f| f.starts_with("material 0")).count(), 1);
+    }
+
+    #[test]
+    fn faults_of_environments_are_named() {
+        let sky = Sky::natural(SkyModel::Preetham { turbidity: 2.5 }, Some([40.0, 90.0]));
+        let map = |pixels: Vec<[f32; 3]>, strength| {
+            let image = Arc::new(RadianceMap { name: "m".into(), width: 2, height: 1, pixels });
+            Environment::Map(EnvironmentMap { image, rotation: 0.0, strength })
+        };
+        let low = Sky::natural(SkyModel::Clear, Some([-3.0, 90.0]));
+        let wrong = [
+            (Environment::Uniform(Rgb::grey(f64::NAN)), "radiance"),
+            (map(vec![[1.0; 3]], 1.0), "size"),
+            (map(vec![[1.0; 3]; 2], -1.0), "strength"),
+            (map(vec![[1.0; 3], [f32::INFINITY; 3]], 1.0), "pixel (1, 0)"),
+            (Environment::Sky(low), "below the horizon"),
+            (Environment::Sky(Sky { model: SkyModel::Preetham { turbidity: 1.0 }, ..sky.clone() }), "turbidity"),
+            (Environment::Sky(Sky { level: SkyLevel::Zenith(-1.0), ..sky.clone() }), "nit"),
+            (Environment::Sky(Sky { ground: Rgb::grey(1.5), ..sky.clone() }), "albedo"),
+            (Environment::Sky(Sky { sun: Some(Rgb::grey(f64::NAN)), ..sky.clone() }), "sunlight"),
+            (Environment::Sky(Sky { towards_sun: 2.0 * sky.towards_sun, ..sky.clone() }), "unit vector"),
+        ];
+        for (environment, word) in wrong {
+            let faults = Scene { environment: Some(environment), ..Scene::default() }.validate();
+            assert!(faults.len() == 1 && faults[0].problem.contains(word), "{word}: {faults:?}");
+        }
+        for environment in [Environment::Sky(sky), map(vec![[0.0; 3]; 2], 0.0)] {
+            assert_eq!(Scene { environment: Some(environment), ..Scene::default() }.validate(), []);
+        }
     }
 
     /// A factor of 1 and a lobe of 0.5 are too much, unless the texture is dark.

@@ -138,7 +138,7 @@ impl<'a> Frozen<'a> {
         };
         let by_patches = channel * lobes * if by_power.is_finite() { by_power } else { bounds() };
         let by_sky = match self.start.scene.environment() {
-            Some(e) if c.environment > 0.0 => channel * e.power().luminance() / c.environment,
+            Some(e) if c.environment > 0.0 => channel * e.largest_power() / c.environment,
             _ => 0.0,
         };
         let largest = if by_patches.is_finite() { by_patches.max(by_sky) } else { by_sky };
