@@ -39,7 +39,7 @@ impl std::fmt::Display for Addition {
 /// # Errors
 /// As [`PatchScene::new`]: a scene without surfaces has no sensible camera.
 pub fn complete(scene: &mut Scene, camera: Option<&Camera>, two_sided: bool) -> Result<Vec<Addition>, PatchError> {
-    let lit = scene.environment.is_some() || emits(scene);
+    let lit = scene.environment.is_some() || !scene.lights.is_empty() || emits(scene);
     if lit && (camera.is_some() || !scene.cameras.is_empty()) {
         return Ok(Vec::new());
     }
@@ -258,6 +258,11 @@ impl PatchScene {
     /// Emitted power of all patches, W (or lumen where radiance is in nit): Σ π A L.
     pub fn emitted_power(&self) -> Rgb {
         self.patches().map(|p| self.emission(p) * (std::f64::consts::PI * self.area(p))).sum()
+    }
+
+    /// Power of all lights without area, W (or lumen); of directional ones what comes through the disc around the scene.
+    pub fn lights_power(&self) -> Rgb {
+        self.lights.iter().map(|light| light.power()).sum()
     }
 
     /// Area of all patches, m²; both sides of two-sided surfaces.

@@ -72,7 +72,8 @@ pub fn estimate(scene: &Scene, options: PatchOptions) -> Result<Estimate, PatchE
     }
     let (triangles, patches) = (outlines.len(), patches as usize);
     // A scene without light gets some before it is solved, perhaps a lamp.
-    let emits = scene.environment.is_none() || scene.materials.iter().any(|m| !m.emission.is_black());
+    let emits = (scene.environment.is_none() && scene.lights.is_empty())
+        || scene.materials.iter().any(|m| !m.emission.is_black());
     let holes = scene.materials.iter().any(|m| m.opacity != Opacity::Opaque);
     let constants = size_of::<u32>() + 12 + if emits { 12 } else { 0 } + if holes { 4 } else { 0 };
 

@@ -38,6 +38,8 @@ impl PatchScene {
             hash.double(self.area(patch));
         }
         hash.surroundings(self.environment.as_ref().map(|e| e.environment()));
+        // What has no such lights keeps its fingerprint from the time before them.
+        self.lights.iter().for_each(|light| light.words().for_each(|word| hash.word(word)));
         hash.0
     }
 
@@ -169,7 +171,9 @@ mod tests {
     use glam::{DAffine3, DVec3};
 
     use super::*;
-    use crate::authored::{EnvironmentMap, RadianceMap, Scene, Sky, Texel, TextureRef, Wrap};
+    use crate::authored::{
+        EnvironmentMap, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, Texel, TextureRef, Wrap,
+    };
     use crate::builtin;
     use crate::patch::{PatchBudget, PatchOptions};
 
@@ -219,6 +223,26 @@ mod tests {
         under_the_sky.environment = map(1.0, 0.0);
         shows("a pixel of the map", &under_the_sky, |s| s.environment = map(0.9, 0.0));
         shows("the map's turn", &under_the_sky, |s| s.environment = map(1.0, 0.1));
+        let light = |x: f64, candela: f32, kind| PunctualLight {
+            name: "x".into(),
+            kind,
+            intensity: Rgb::WHITE,
+            transform: DAffine3::from_translation(DVec3::new(x, 0.2, 0.3)),
+            profile: (kind == LightKind::Point).then(|| {
+                let (vertical, horizontal) = (vec![0.0, 180.0], vec![0.0]);
+                Arc::new(LightProfile { name: String::new(), vertical, horizontal, candela: vec![candela, 1.0] })
+            }),
+        };
+        let spot = |inner| LightKind::Spot { inner, outer: 0.5 };
+        let mut lit = base.clone();
+        lit.lights = vec![light(0.1, 2.0, LightKind::Point), light(0.1, 2.0, spot(0.2))];
+        shows("lights", &base, |s| s.lights = lit.lights.clone());
+        shows("a light's place", &lit, |s| s.lights[0].transform.translation.x += 1e-9);
+        shows("a light's turn", &lit, |s| s.lights[1].transform.matrix3 = DAffine3::from_rotation_x(0.1).matrix3);
+        shows("a light's colour", &lit, |s| s.lights[1].intensity.r = 0.9);
+        shows("a profile", &lit, |s| s.lights[0] = light(0.1, 2.5, LightKind::Point));
+        shows("a cone", &lit, |s| s.lights[1] = light(0.1, 2.0, spot(0.3)));
+        hides("a light's name", &lit, |s| s.lights[0].name = "y".into());
         shows("the second side", &base, |s| s.materials[0].two_sided = true);
         for (k, m) in base.materials.iter().enumerate() {
             let other = Surface::Lambertian { reflectance: Texel::constant(Rgb::grey(0.123)) };

@@ -15,6 +15,7 @@ use crate::brdf::{Brdf, Detail, Ggx, Passing, Phong, Scatter, Specular};
 use crate::cells::{Cells, Outline};
 use crate::environment::EnvironmentLight;
 use crate::geom::area_vector_2;
+use crate::punctual::PointLight;
 use crate::rgb::Rgb;
 use crate::texture::{self, Encoding};
 
@@ -133,6 +134,7 @@ pub struct PatchScene {
     /// Whether shadow rays pass some surfaces.
     panes: bool,
     pub(crate) environment: Option<EnvironmentLight>,
+    pub(crate) lights: Vec<PointLight>,
     /// Per patch: triangle × 2 + side.
     owner: Vec<u32>,
     /// Per patch: mean base colour.
@@ -208,6 +210,7 @@ impl PatchScene {
             passes: false,
             panes: scene.materials.iter().any(|m| m.transmission.as_ref().is_some_and(|t| t.volume.is_none())),
             environment: scene.environment.clone().map(|e| EnvironmentLight::new(e, radius)),
+            lights: scene.lights.iter().map(|light| PointLight::new(light, centre, radius)).collect(),
             owner,
             base_color: Vec::new(),
             emission: Vec::new(),
@@ -254,6 +257,11 @@ impl PatchScene {
     /// The surroundings, if they emit.
     pub fn environment(&self) -> Option<&EnvironmentLight> {
         self.environment.as_ref()
+    }
+
+    /// The lights without area, in the order of the scene.
+    pub fn lights(&self) -> &[PointLight] {
+        &self.lights
     }
 
     /// All patches.

@@ -3,7 +3,8 @@
 //! Readers give sound scenes; scenes built by hand go through here before they are cut into patches.
 
 use crate::authored::{
-    Environment, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel, TextureImage, TextureRef,
+    Environment, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel,
+    TextureImage, TextureRef,
 };
 use crate::rgb::Rgb;
 use crate::texture::srgb_to_linear;
@@ -89,11 +90,51 @@ impl Scene {
                 fault(format!("image {i} \"{}\"", image.name), "its size does not match its texels".into());
             }
         }
+        for (i, light) in self.lights.iter().enumerate() {
+            if let Some(problem) = light_fault(light) {
+                fault(format!("light {i} \"{}\"", light.name), problem);
+            }
+        }
         if let Some(problem) = self.environment.as_ref().and_then(environment_fault) {
             fault("environment".into(), problem);
         }
         faults
     }
+}
+
+/// What is wrong with a light without area.
+fn light_fault(light: &PunctualLight) -> Option<String> {
+    if !light.transform.is_finite() {
+        return Some("its transform is not finite".into());
+    }
+    if !is_radiance(light.intensity) {
+        return Some(format!("intensity {:?}, {RADIANCE}", light.intensity.to_array()));
+    }
+    if let LightKind::Spot { inner, outer } = light.kind
+        && !(0.0 <= inner && inner < outer && outer <= std::f64::consts::FRAC_PI_2 + 1e-9)
+    {
+        return Some(format!("cones of {inner} and {outer}, expected 0 ≤ inner < outer ≤ π/2"));
+    }
+    let Some(profile) = &light.profile else { return None };
+    if light.kind != LightKind::Point {
+        return Some("a profile on a light that is no point".into());
+    }
+    let LightProfile { vertical, horizontal, candela, .. } = &**profile;
+    let ascends = |angles: &[f32], most: f32| {
+        let within = angles.iter().all(|a| (0.0..=most).contains(a));
+        within && !angles.is_empty() && angles.windows(2).all(|pair| pair[0] < pair[1])
+    };
+    if !(ascends(vertical, 180.0) && ascends(horizontal, 360.0)) {
+        return Some("angles of its profile that do not ascend within 0 to 180° (γ) and 0 to 360° (C)".into());
+    }
+    let around = [horizontal[0], horizontal[horizontal.len() - 1]];
+    if around != [0.0; 2] && around != [0.0, 360.0] {
+        return Some(format!("a profile from C = {} to {}, expected 0 alone, or 0 to 360", around[0], around[1]));
+    }
+    if candela.len() != vertical.len() * horizontal.len() || !candela.iter().all(|c| *c >= 0.0 && c.is_finite()) {
+        return Some("candela values that are not a finite, positive number for every pair of angles".into());
+    }
+    None
 }
 
 /// What is wrong with an environment.
@@ -192,6 +233,40 @@ mod tests {
         assert_eq!(faults.iter().filter(|f| f.starts_with("mesh 0")).count(), 3);
         assert_eq!(faults.iter().filter(|f| f.starts_with("instance 0")).count(), 1);
         assert_eq!(faults.iter().filter(|f| f.starts_with("material 0")).count(), 1);
+    }
+
+    #[test]
+    fn faults_of_lights_are_named() {
+        let light = |kind, profile: Option<LightProfile>| PunctualLight {
+            name: "l".into(),
+            kind,
+            intensity: Rgb::WHITE,
+            transform: DAffine3::IDENTITY,
+            profile: profile.map(Arc::new),
+        };
+        let profile = |vertical: &[f32], horizontal: &[f32], candela: &[f32]| {
+            let (vertical, horizontal, candela) = (vertical.to_vec(), horizontal.to_vec(), candela.to_vec());
+            Some(LightProfile { name: "p".into(), vertical, horizontal, candela })
+        };
+        let good = || profile(&[0.0, 90.0], &[0.0], &[1.0, 0.0]);
+        let spot = |inner, outer| LightKind::Spot { inner, outer };
+        let wrong = [
+            (PunctualLight { intensity: Rgb::grey(-1.0), ..light(LightKind::Point, None) }, "intensity"),
+            (light(spot(0.5, 0.5), None), "cones"),
+            (light(spot(0.5, 2.0), None), "cones"),
+            (light(LightKind::Directional, good()), "no point"),
+            (light(LightKind::Point, profile(&[90.0, 0.0], &[0.0], &[1.0, 0.0])), "ascend"),
+            (light(LightKind::Point, profile(&[0.0, 90.0], &[0.0, 90.0], &[1.0; 4])), "C = 0 to 90"),
+            (light(LightKind::Point, profile(&[0.0, 90.0], &[0.0], &[1.0])), "candela"),
+            (light(LightKind::Point, profile(&[0.0, 90.0], &[0.0], &[1.0, -1.0])), "candela"),
+        ];
+        for (light, word) in wrong {
+            let faults = Scene { lights: vec![light], ..Scene::default() }.validate();
+            assert!(faults.len() == 1 && faults[0].problem.contains(word), "{word}: {faults:?}");
+        }
+        let lights =
+            vec![light(LightKind::Point, good()), light(spot(0.0, 1.5), None), light(LightKind::Directional, None)];
+        assert_eq!(Scene { lights, ..Scene::default() }.validate(), []);
     }
 
     #[test]
