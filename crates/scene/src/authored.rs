@@ -42,8 +42,13 @@ pub struct Mesh {
     pub positions: Vec<[f32; 3]>,
     /// Vertex normals `[vertices]`, used for smooth display only; light is computed with geometric normals.
     pub normals: Option<Vec<[f32; 3]>>,
+    /// Tangents `[vertices]` for normal maps: a direction along the surface, and the sign of the bitangent,
+    /// normal × tangent × sign. Without them, normal maps follow the texture coordinates.
+    pub tangents: Option<Vec<[f32; 4]>>,
     /// First set of texture coordinates `[vertices]`.
     pub texcoords: Option<Vec<[f32; 2]>>,
+    /// Second set of texture coordinates `[vertices]`.
+    pub second_texcoords: Option<Vec<[f32; 2]>>,
     /// Vertex indices `[triangles][3]`, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Index into `Scene::materials`.
@@ -102,6 +107,20 @@ impl Material {
     /// True if both sides meet light: light that has entered a body also leaves it.
     pub fn has_two_sides(&self) -> bool {
         self.two_sided || self.transmission.is_some()
+    }
+
+    /// Every use of an image.
+    pub fn textures(&self) -> Vec<&TextureRef> {
+        let surface = match &self.surface {
+            Surface::Lambertian { reflectance } => [&reflectance.texture, &None],
+            Surface::MetallicRoughness { base_color, metallic_roughness_texture, .. } => {
+                [&base_color.texture, metallic_roughness_texture]
+            }
+            Surface::Phong { diffuse, .. } => [&diffuse.texture, &None],
+        };
+        let passing = self.transmission.as_ref().and_then(|t| t.texture.as_ref());
+        let bumps = self.normal_map.as_ref().map(|n| &n.texture);
+        surface.into_iter().flatten().chain(&self.emission_texture).chain(passing).chain(bumps).collect()
     }
 }
 
@@ -209,6 +228,56 @@ pub struct TextureRef {
     pub wrap: [Wrap; 2],
     /// True: nearest texel; false: bilinear.
     pub nearest: bool,
+    /// Which of the mesh's sets of texture coordinates: 0 or 1.
+    pub set: u8,
+    /// Where the picture lies on the surface.
+    pub transform: TextureTransform,
+}
+
+impl TextureRef {
+    /// The picture `image` as it is: tiled, bilinear, by the first set of texture coordinates.
+    pub fn of(image: usize) -> Self {
+        Self { image, wrap: [Wrap::Repeat; 2], nearest: false, set: 0, transform: TextureTransform::default() }
+    }
+}
+
+/// Texture coordinates to those of the look-up, as `KHR_texture_transform` has it: scaled, turned, moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureTransform {
+    /// Added last; in units of the picture's size.
+    pub offset: [f64; 2],
+    /// Turns the coordinates counter-clockwise as seen on the picture, whose v points down; radians.
+    pub rotation: f64,
+    /// Multiplies u and v, first.
+    pub scale: [f64; 2],
+}
+
+impl Default for TextureTransform {
+    fn default() -> Self {
+        Self { offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2] }
+    }
+}
+
+impl TextureTransform {
+    /// The coordinates of the look-up for those of the mesh.
+    #[inline]
+    pub fn apply(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let [u, v] = self.turned([self.scale[0] * u, self.scale[1] * v]);
+        [u + self.offset[0], v + self.offset[1]]
+    }
+
+    /// How far the look-up moves where the mesh's coordinates move by `step`.
+    pub fn apply_to_step(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        self.turned([self.scale[0] * u, self.scale[1] * v])
+    }
+
+    fn turned(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        if self.rotation == 0.0 {
+            return [u, v];
+        }
+        let (sin, cos) = libm::sincos(self.rotation);
+        [cos * u + sin * v, cos * v - sin * u]
+    }
 }
 
 /// Texture addressing outside [0, 1].

@@ -10,6 +10,7 @@ use crate::authored::{Opacity, Scene, Surface, Texel};
 use crate::cells::Outline;
 use crate::patch::{
     Attributes, PatchError, PatchOptions, Triangle, TriangleMeans, base_texel, bounds, cell_area, place,
+    rare_attributes,
 };
 use crate::rgb::Rgb;
 
@@ -52,7 +53,7 @@ pub fn estimate(scene: &Scene, options: PatchOptions) -> Result<Estimate, PatchE
         let material = placed.mesh.material;
         let sides = 1 + u32::from(scene.materials[material].has_two_sides() || options.two_sided);
         outlines.push((Outline::of(placed.corners()), sides));
-        materials.push((material as u32, placed.mesh.texcoords.is_some()));
+        materials.push((material as u32, placed.mesh.texcoords.is_some() || placed.mesh.second_texcoords.is_some()));
     });
     if outlines.is_empty() {
         return Err(PatchError::Empty);
@@ -78,7 +79,10 @@ pub fn estimate(scene: &Scene, options: PatchOptions) -> Result<Estimate, PatchE
     let constants = size_of::<u32>() + 12 + if emits { 12 } else { 0 } + if holes { 4 } else { 0 };
 
     let [kernel, kernel_peak] = Bvh::expected_bytes(triangles);
-    let fixed = triangles * (size_of::<Triangle>() + size_of::<Attributes>());
+    let [second, tangents] = rare_attributes(scene);
+    let rare = if second { size_of::<Option<[[f32; 2]; 3]>>() } else { 0 }
+        + if tangents { size_of::<Option<[[f32; 4]; 3]>>() } else { 0 };
+    let fixed = triangles * (size_of::<Triangle>() + size_of::<Attributes>() + rare);
     let kernel_input = triangles * size_of::<[[f32; 3]; 3]>();
     let while_built = kernel_input + size_of::<u32>() * patches + kernel_peak;
     // Every triangle's means are three lists: of one entry each, or grown to one for each cell.
@@ -127,8 +131,14 @@ impl Scene {
     pub fn bytes(&self) -> usize {
         let meshes = self.meshes.iter().map(|m| {
             let normals = m.normals.as_ref().map_or(0, |n| n.len() * 12);
-            let texcoords = m.texcoords.as_ref().map_or(0, |t| t.len() * 8);
-            size_of_val(m) + m.name.len() + 12 * (m.positions.len() + m.triangles.len()) + normals + texcoords
+            let tangents = m.tangents.as_ref().map_or(0, |t| t.len() * 16);
+            let texcoords = m.texcoords.iter().chain(&m.second_texcoords).map(|t| t.len() * 8).sum::<usize>();
+            size_of_val(m)
+                + m.name.len()
+                + 12 * (m.positions.len() + m.triangles.len())
+                + normals
+                + tangents
+                + texcoords
         });
         let instances = self.instances.iter().map(|i| size_of_val(i) + i.name.len());
         let images = self.images.iter().map(|i| size_of_val(&**i) + i.rgba.len());

@@ -21,7 +21,8 @@ pub mod validate;
 
 pub use authored::{
     Environment, EnvironmentMap, Instance, LightKind, LightProfile, Material, Mesh, NormalMap, Opacity, PunctualLight,
-    RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel, TextureImage, TextureRef, Transmission, Volume, Wrap,
+    RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel, TextureImage, TextureRef, TextureTransform,
+    Transmission, Volume, Wrap,
 };
 pub use bvh::SurfaceHit;
 pub use camera::{Camera, Projection};

@@ -124,6 +124,10 @@ pub(crate) struct Attributes {
 pub struct PatchScene {
     pub(crate) triangles: Vec<Triangle>,
     pub(crate) attributes: Vec<Attributes>,
+    /// Per triangle, as its mesh has them; empty if no material asks.
+    pub(crate) second_texcoords: Vec<Option<[[f32; 2]; 3]>>,
+    /// Per triangle, in the world, with the sign of the bitangent; empty if no material asks.
+    pub(crate) tangents: Vec<Option<[[f32; 4]; 3]>>,
     pub(crate) materials: Vec<Material>,
     pub(crate) images: Vec<Arc<TextureImage>>,
     pub(crate) kernel: twinray_rays::Bvh,
@@ -166,6 +170,8 @@ impl PatchScene {
         let (centre, radius) = bounds(scene).ok_or(PatchError::Empty)?;
         let mut triangles = Vec::new();
         let mut attributes = Vec::new();
+        let (mut second_texcoords, mut tangents) = (Vec::new(), Vec::new());
+        let [with_second, with_tangents] = rare_attributes(scene);
         let left_out = place(scene, centre, &mut |placed| {
             let Placed { mesh, corner, vertices, across, .. } = placed;
             triangles.push(Triangle {
@@ -186,6 +192,12 @@ impl PatchScene {
                 }),
                 texcoords: mesh.texcoords.as_ref().map(|t| corner.map(|k| t[k])),
             });
+            if with_second {
+                second_texcoords.push(mesh.second_texcoords.as_ref().map(|t| corner.map(|k| t[k])));
+            }
+            if with_tangents {
+                tangents.push(mesh.tangents.as_ref().map(|t| corner.map(|k| placed.tangent(t[k]))));
+            }
         });
         if triangles.is_empty() {
             return Err(PatchError::Empty);
@@ -203,6 +215,8 @@ impl PatchScene {
         let mut this = Self {
             triangles,
             attributes,
+            second_texcoords,
+            tangents,
             materials: scene.materials.clone(),
             images: scene.images.clone(),
             kernel: twinray_rays::Bvh::build(&kernel_input),
@@ -539,10 +553,11 @@ impl PatchScene {
 
     /// Bytes of the ray kernel and of the patches' constants.
     pub fn bytes(&self) -> [usize; 2] {
+        let rare = size_of_val(self.second_texcoords.as_slice()) + size_of_val(self.tangents.as_slice());
         let per_triangle = size_of::<Triangle>() + size_of::<Attributes>();
         let per_patch =
             4 + 12 + if self.emission.is_empty() { 0 } else { 12 } + if self.coverage.is_empty() { 0 } else { 4 };
-        [self.kernel.bytes(), self.triangles.len() * per_triangle + self.len() * per_patch]
+        [self.kernel.bytes(), self.triangles.len() * per_triangle + rare + self.len() * per_patch]
     }
 
     fn texture_at(
@@ -553,11 +568,20 @@ impl PatchScene {
         u: f64,
         v: f64,
     ) -> (Rgb, f64) {
-        let (Some(texture), Some(t)) = (texture, self.attributes[triangle as usize].texcoords) else {
+        let Some((texture, t)) = texture.and_then(|t| Some((t, self.texcoords(triangle, t)?))) else {
             return (Rgb::WHITE, 1.0);
         };
         let at = |k: usize| f64::from(t[0][k]) * (1.0 - u - v) + f64::from(t[1][k]) * u + f64::from(t[2][k]) * v;
         texture::lookup(&self.images[texture.image], texture, encoding, at(0), at(1))
+    }
+
+    /// The triangle's texture coordinates of the set that `texture` names, if it has them.
+    pub(crate) fn texcoords(&self, triangle: u32, texture: &TextureRef) -> Option<[[f32; 2]; 3]> {
+        let triangle = triangle as usize;
+        if texture.set == 0 {
+            return self.attributes[triangle].texcoords;
+        }
+        self.second_texcoords.get(triangle).copied().flatten()
     }
 
     /// Fills the patches' means of textures: colour, emission, coverage; and the triangles' metalness and roughness.
@@ -600,8 +624,8 @@ impl PatchScene {
         {
             (metallic, roughness, mr_texture) = (*m, *r, metallic_roughness_texture.as_ref());
         }
-        let has_uv = self.attributes[triangle as usize].texcoords.is_some();
-        let textured = has_uv && (texel.texture.is_some() || material.emission_texture.is_some());
+        let usable = |t: &Option<TextureRef>| t.as_ref().is_some_and(|t| self.texcoords(triangle, t).is_some());
+        let textured = usable(&texel.texture) || usable(&material.emission_texture);
         let mut means = TriangleMeans {
             color: vec![texel.factor.to_f32()],
             emission: vec![material.emission.to_f32()],
@@ -610,10 +634,10 @@ impl PatchScene {
             roughness: roughness as f32,
             transmission: material.transmission.as_ref().map_or(0.0, |x| x.factor) as f32,
         };
-        if has_uv && mr_texture.is_some() {
+        if let Some(texture) = mr_texture.filter(|t| self.texcoords(triangle, t).is_some()) {
             let whole = Cells::Regular { m: 1 };
-            let n = self.samples_per_cell(triangle, 1, texels);
-            let at = |[u, v]: [f64; 2]| self.texture_at(mr_texture, triangle, Encoding::Linear, u, v).0;
+            let n = self.samples_per_cell(triangle, &[texture], 1, texels);
+            let at = |[u, v]: [f64; 2]| self.texture_at(Some(texture), triangle, Encoding::Linear, u, v).0;
             let mean = (0..n).map(|k| at(spread_point(&whole, 0, k))).sum::<Rgb>() / f64::from(n);
             // glTF: roughness in green, metalness in blue.
             (means.metallic, means.roughness) = ((metallic * mean.b) as f32, (roughness * mean.g) as f32);
@@ -622,7 +646,8 @@ impl PatchScene {
             return means;
         }
         let count = t.cells.count();
-        let n = self.samples_per_cell(triangle, count, texels);
+        let textures: Vec<_> = texel.texture.iter().chain(&material.emission_texture).collect();
+        let n = self.samples_per_cell(triangle, &textures, count, texels);
         let (mut colors, mut emissions, mut coverages) = (Vec::new(), Vec::new(), Vec::new());
         for cell in 0..count {
             let (mut color, mut emission, mut present) = (Rgb::BLACK, Rgb::BLACK, 0.0);
@@ -645,12 +670,19 @@ impl PatchScene {
         means
     }
 
-    /// Sample points for a cell's mean: about one per texel, between 4 and 64.
-    fn samples_per_cell(&self, triangle: u32, cells: u32, texels: f64) -> u32 {
-        let Some(t) = self.attributes[triangle as usize].texcoords else { return 1 };
-        let d = |i: usize, k: usize| f64::from(t[i][k] - t[0][k]);
-        let uv_area = 0.5 * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0)).abs();
+    /// Sample points for a cell's mean of `textures`: about one per texel, between 4 and 64.
+    fn samples_per_cell(&self, triangle: u32, textures: &[&TextureRef], cells: u32, texels: f64) -> u32 {
+        let area = |texture: &&TextureRef| self.uv_area(triangle, texture).unwrap_or(0.0);
+        let uv_area = textures.iter().map(area).fold(0.0, f64::max);
         ((uv_area * texels / f64::from(cells)).ceil() as u32).clamp(4, 64)
+    }
+
+    /// How much of its picture, or of how many copies of it, `texture` shows on a triangle.
+    pub(crate) fn uv_area(&self, triangle: u32, texture: &TextureRef) -> Option<f64> {
+        let t = self.texcoords(triangle, texture)?;
+        let d = |i: usize, k: usize| f64::from(t[i][k] - t[0][k]);
+        let [a, b] = texture.transform.scale;
+        Some(0.5 * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0)).abs() * (a * b).abs())
     }
 }
 
@@ -709,6 +741,20 @@ pub(crate) fn bounds(scene: &Scene) -> Option<(DVec3, f64)> {
     Some((centre, radius))
 }
 
+/// Whether any placed mesh has a second set of texture coordinates, and tangents, that its material asks for.
+pub(crate) fn rare_attributes(scene: &Scene) -> [bool; 2] {
+    let any = |wanted: &dyn Fn(&Mesh, &Material) -> bool| {
+        scene.instances.iter().any(|i| {
+            let mesh = &scene.meshes[i.mesh];
+            wanted(mesh, &scene.materials[mesh.material])
+        })
+    };
+    [
+        any(&|mesh, m| mesh.second_texcoords.is_some() && m.textures().iter().any(|t| t.set == 1)),
+        any(&|mesh, m| mesh.tangents.is_some() && m.normal_map.is_some()),
+    ]
+}
+
 /// A triangle where it stands.
 pub(crate) struct Placed<'a> {
     pub mesh: &'a Mesh,
@@ -719,9 +765,16 @@ pub(crate) struct Placed<'a> {
     /// Twice its area vector.
     pub across: DVec3,
     normal_matrix: DMat3,
+    matrix: DMat3,
 }
 
 impl Placed<'_> {
+    /// A tangent in the world. The cross product turns round under a mirror, so the sign of the bitangent does too.
+    fn tangent(&self, [x, y, z, sign]: [f32; 4]) -> [f32; 4] {
+        let [x, y, z] = (self.matrix * vec([x, y, z])).normalize_or_zero().as_vec3().to_array();
+        [x, y, z, if self.matrix.determinant() < 0.0 { -sign } else { sign }]
+    }
+
     pub fn corners(&self) -> [DVec3; 3] {
         self.vertices.map(vec)
     }
@@ -748,7 +801,7 @@ pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) 
                 left_out += 1;
                 continue;
             }
-            each(Placed { mesh, corner, vertices, across, normal_matrix });
+            each(Placed { mesh, corner, vertices, across, normal_matrix, matrix: place.matrix3 });
         }
     }
     left_out

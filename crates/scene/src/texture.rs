@@ -32,8 +32,10 @@ pub fn linear_to_srgb(v: f64) -> f64 {
     if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
 }
 
-/// Colour and alpha at (`u`, `v`); v = 0 is the top row, texel centres at half integers.
+/// Colour and alpha where the mesh's texture coordinates are (`u`, `v`); v = 0 is the top row, texel centres at half
+/// integers.
 pub fn lookup(image: &TextureImage, texture: &TextureRef, encoding: Encoding, u: f64, v: f64) -> (Rgb, f64) {
+    let [u, v] = texture.transform.apply([u, v]);
     let (x, y) = (u * f64::from(image.width), v * f64::from(image.height));
     if texture.nearest {
         return texel(image, texture, encoding, x.floor(), y.floor());
@@ -76,13 +78,14 @@ fn wrapped(x: f64, size: u32, wrap: Wrap) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::authored::TextureTransform;
 
     fn two_texels() -> TextureImage {
         TextureImage { name: "t".into(), width: 2, height: 1, rgba: vec![0, 0, 0, 255, 255, 255, 255, 0] }
     }
 
     fn reference(wrap: Wrap) -> TextureRef {
-        TextureRef { image: 0, wrap: [wrap; 2], nearest: false }
+        TextureRef { wrap: [wrap; 2], ..TextureRef::of(0) }
     }
 
     #[test]
@@ -96,6 +99,22 @@ mod tests {
         assert!((red(Wrap::Mirror, 1.25) - 1.0).abs() < 1e-12);
         assert!((lookup(&image, &reference(Wrap::Clamp), Encoding::Srgb, 0.5, 0.5).1 - 0.5).abs() < 1e-12);
         assert!(red(Wrap::Repeat, f64::NAN).is_finite() || red(Wrap::Repeat, f64::NAN).is_nan());
+    }
+
+    /// The example of the extension's specification shows the lower left quarter of the picture, turned clockwise by a
+    /// right angle: what was its upper left corner is on the upper right.
+    #[test]
+    fn transforms_turn_as_the_specification_says() {
+        let quarter = TextureTransform { offset: [0.0, 1.0], rotation: std::f64::consts::FRAC_PI_2, scale: [0.5, 0.5] };
+        for (at, expected) in [([0.0, 0.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.5]), ([0.0, 1.0], [0.5, 1.0])] {
+            let found = quarter.apply(at);
+            assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{at:?}: {found:?}");
+        }
+        assert_eq!(TextureTransform::default().apply([0.3, 7.0]), [0.3, 7.0]);
+        // And look-ups use it: half a picture to the right is the other texel.
+        let moved = TextureTransform { offset: [0.5, 0.0], ..TextureTransform::default() };
+        let texture = TextureRef { transform: moved, ..reference(Wrap::Repeat) };
+        assert_eq!(lookup(&two_texels(), &texture, Encoding::Linear, 0.25, 0.5).0.r, 1.0);
     }
 
     #[test]

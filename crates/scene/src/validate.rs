@@ -3,8 +3,8 @@
 //! Readers give sound scenes; scenes built by hand go through here before they are cut into patches.
 
 use crate::authored::{
-    Environment, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel,
-    TextureImage, TextureRef,
+    Environment, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface,
+    TextureImage, TextureTransform,
 };
 use crate::rgb::Rgb;
 use crate::texture::srgb_to_linear;
@@ -36,9 +36,13 @@ impl Scene {
             if mesh.positions.iter().flatten().any(|x| !x.is_finite()) {
                 fault(element(), "a vertex position is not finite".into());
             }
-            if mesh.normals.as_ref().is_some_and(|v| v.len() != n)
-                || mesh.texcoords.as_ref().is_some_and(|v| v.len() != n)
-            {
+            let lengths = [
+                mesh.normals.as_ref().map(Vec::len),
+                mesh.tangents.as_ref().map(Vec::len),
+                mesh.texcoords.as_ref().map(Vec::len),
+                mesh.second_texcoords.as_ref().map(Vec::len),
+            ];
+            if lengths.iter().flatten().any(|&length| length != n) {
                 fault(element(), format!("attributes of another length than the {n} positions"));
             }
         }
@@ -55,18 +59,14 @@ impl Scene {
         let mut brightest: Vec<Option<Rgb>> = vec![None; self.images.len()];
         for (i, material) in self.materials.iter().enumerate() {
             let element = || format!("material {i} \"{}\"", material.name);
-            let (colors, textures): (Vec<Rgb>, Vec<&TextureRef>) = match &material.surface {
-                Surface::Lambertian { reflectance } => (vec![reflectance.factor], textures(&[reflectance])),
-                Surface::MetallicRoughness { base_color, metallic_roughness_texture, .. } => {
-                    let mut all = textures(&[base_color]);
-                    all.extend(metallic_roughness_texture);
-                    (vec![base_color.factor], all)
-                }
+            let colors: Vec<Rgb> = match &material.surface {
+                Surface::Lambertian { reflectance } => vec![reflectance.factor],
+                Surface::MetallicRoughness { base_color, .. } => vec![base_color.factor],
                 Surface::Phong { diffuse, specular, .. } => {
                     let image = diffuse.texture.as_ref().map(|t| t.image).filter(|&i| i < self.images.len());
                     let brightest = image
                         .map_or(Rgb::WHITE, |i| *brightest[i].get_or_insert_with(|| brightest_texel(&self.images[i])));
-                    (vec![diffuse.factor * brightest + *specular, diffuse.factor, *specular], textures(&[diffuse]))
+                    vec![diffuse.factor * brightest + *specular, diffuse.factor, *specular]
                 }
             };
             for c in colors {
@@ -78,10 +78,29 @@ impl Scene {
             if !is_radiance(material.emission) {
                 fault(element(), format!("emission {:?}, {RADIANCE}", material.emission.to_array()));
             }
-            for t in textures.into_iter().chain(&material.emission_texture) {
+            for t in material.textures() {
                 if t.image >= self.images.len() {
                     fault(element(), format!("image {} of {}", t.image, self.images.len()));
                 }
+                if t.set > 1 {
+                    fault(element(), format!("set {} of texture coordinates, expected 0 or 1", t.set));
+                }
+                let TextureTransform { offset, rotation, scale } = t.transform;
+                if ![offset, [rotation, 0.0], scale].iter().flatten().all(|x| x.is_finite()) {
+                    fault(element(), "a texture's transform is not finite".into());
+                }
+            }
+            if let Some(t) = &material.transmission {
+                if !(0.0..=1.0).contains(&t.factor) {
+                    fault(element(), format!("transmission {}, expected 0 to 1", t.factor));
+                }
+                let attenuation = t.volume.map_or(Rgb::BLACK, |v| v.attenuation);
+                if !attenuation.is_finite() || attenuation.min_channel() < 0.0 {
+                    fault(element(), format!("attenuation {:?}, expected 0 or more", attenuation.to_array()));
+                }
+            }
+            if material.normal_map.as_ref().is_some_and(|n| !n.scale.is_finite()) {
+                fault(element(), "the scale of its normal map is not finite".into());
             }
         }
         for (i, image) in self.images.iter().enumerate() {
@@ -205,14 +224,10 @@ fn brightest_texel(image: &TextureImage) -> Rgb {
     Rgb::from_array(brightest.map(|b| srgb_to_linear(f64::from(b) / 255.0)))
 }
 
-fn textures<'a>(texels: &[&'a Texel]) -> Vec<&'a TextureRef> {
-    texels.iter().filter_map(|t| t.texture.as_ref()).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::authored::{EnvironmentMap, Instance, Material, Mesh, Wrap};
+    use crate::authored::{EnvironmentMap, Instance, Material, Mesh, Texel, TextureRef, Wrap};
     use glam::DAffine3;
     use std::sync::Arc;
 
@@ -301,7 +316,7 @@ mod tests {
     /// A factor of 1 and a lobe of 0.5 are too much, unless the texture is dark.
     #[test]
     fn two_lobes_share_the_light_of_the_brightest_texel() {
-        let texture = TextureRef { image: 0, wrap: [Wrap::Repeat; 2], nearest: true };
+        let texture = TextureRef { nearest: true, ..TextureRef::of(0) };
         let diffuse = Texel { factor: Rgb::WHITE, texture: Some(texture) };
         let surface = Surface::Phong { diffuse, specular: Rgb::grey(0.5), exponent: 10.0 };
         for (byte, faults) in [(100u8, 0), (255, 1)] {

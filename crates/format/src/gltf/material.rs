@@ -263,7 +263,7 @@ impl Reader<'_, '_> {
             wrap = [wrap_mode(&sampler, "wrapS"), wrap_mode(&sampler, "wrapT")];
             nearest = matches!(sampler.integer("magFilter"), Ok(Some(9728)));
         }
-        Ok(Some(TextureRef { image: picture, wrap, nearest }))
+        Ok(Some(TextureRef { wrap, nearest, ..TextureRef::of(picture) }))
     }
 
     /// Our index of image `index` of the file, decoded when first asked for.

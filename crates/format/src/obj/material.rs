@@ -188,7 +188,7 @@ impl Materials {
         }
         let image = self.files.get(&map.file).copied().flatten()?;
         let wrap = [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
-        Some(TextureRef { image, wrap, nearest: false })
+        Some(TextureRef { wrap, ..TextureRef::of(image) })
     }
 
     fn load(&mut self, context: &mut Context<'_>, map: &Map) -> Option<usize> {

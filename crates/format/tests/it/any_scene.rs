@@ -73,6 +73,7 @@ fn mesh(materials: usize) -> impl Strategy<Value = Mesh> {
                 triangles: (0..n as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
                 positions,
                 material,
+                ..Mesh::default()
             }
         },
     )

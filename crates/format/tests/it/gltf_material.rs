@@ -74,9 +74,9 @@ fn textures_are_decoded_once_and_only_when_used() {
     let Surface::MetallicRoughness { base_color, metallic_roughness_texture, .. } = &scene.materials[0].surface else {
         panic!()
     };
-    let sampled = TextureRef { image: 0, wrap: [Wrap::Clamp, Wrap::Mirror], nearest: true };
+    let sampled = TextureRef { wrap: [Wrap::Clamp, Wrap::Mirror], nearest: true, ..TextureRef::of(0) };
     assert_eq!(base_color.texture, Some(sampled));
-    assert_eq!(metallic_roughness_texture, &Some(TextureRef { image: 0, wrap: [Wrap::Repeat; 2], nearest: false }));
+    assert_eq!(metallic_roughness_texture, &Some(TextureRef::of(0)));
 }
 
 #[test]

@@ -17,7 +17,7 @@ fn everything() -> Scene {
     let image = TextureImage { name: "tiles".into(), width: 2, height: 2, rgba };
     let textured = |factor| Texel {
         factor,
-        texture: Some(TextureRef { image: 0, wrap: [Wrap::Mirror, Wrap::Clamp], nearest: true }),
+        texture: Some(TextureRef { wrap: [Wrap::Mirror, Wrap::Clamp], nearest: true, ..TextureRef::of(0) }),
     };
     let material = |name: &str, surface| Material { name: name.into(), surface, ..Material::default() };
     let materials = vec![
@@ -59,6 +59,7 @@ fn everything() -> Scene {
         texcoords: rich.then(|| vec![[0.0, 0.25], [1.0, 0.0], [0.3, 1.0], [-2.0, 3.5]]),
         triangles: vec![[0, 1, 2], [2, 3, 0]],
         material,
+        ..Mesh::default()
     };
     let meshes = vec![mesh("a", 0, true), mesh("b", 1, false), mesh("c", 2, true), mesh("d", 3, false)];
     let place = |name: &str, mesh, transform| Instance { name: name.into(), mesh, transform };

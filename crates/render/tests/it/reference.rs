@@ -7,7 +7,7 @@ use twinray_render::reference::{self, IrradianceOptions, PatchTracer, PathPictur
 use twinray_scene::brdf::Brdf;
 use twinray_scene::{
     Camera, Environment, Opacity, PatchBudget, PatchId, PatchOptions, PatchScene, Projection, Rgb, Scene, Surface,
-    Texel, TextureImage, TextureRef, Wrap, builtin,
+    Texel, TextureImage, TextureRef, builtin,
 };
 use twinray_solve::PatchLight;
 use twinray_testkit::ztest::Mean;
@@ -200,7 +200,7 @@ fn textured_plates() -> Scene {
         height: 8,
         rgba: (0..64).flat_map(|i| texel(i % 8, i / 8)).collect(),
     }));
-    let texture = TextureRef { image: 0, wrap: [Wrap::Repeat; 2], nearest: true };
+    let texture = TextureRef { nearest: true, ..TextureRef::of(0) };
     authored.materials[0].emission = Rgb::grey(1.0);
     authored.materials[0].emission_texture = Some(texture.clone());
     // The alpha channel of the base colour decides where a surface is, also where the base colour is all it has.

@@ -3,7 +3,7 @@
 use glam::DAffine3;
 
 use super::*;
-use crate::authored::{Instance, Mesh, Texel, Wrap};
+use crate::authored::{Instance, Mesh, Texel, TextureTransform, Wrap};
 use crate::builtin;
 
 fn square(transform: DAffine3, two_sided: bool) -> Scene {
@@ -113,7 +113,7 @@ fn textures_are_averaged_and_holes_shrink_patches() {
         height: 1,
         rgba: vec![255, 255, 255, 255, 0, 0, 0, 0],
     })];
-    let texture = TextureRef { image: 0, wrap: [Wrap::Clamp; 2], nearest: true };
+    let texture = TextureRef { wrap: [Wrap::Clamp; 2], nearest: true, ..TextureRef::of(0) };
     scene.materials[0].surface =
         Surface::Lambertian { reflectance: Texel { factor: Rgb::grey(0.8), texture: Some(texture) } };
     let opaque = patches(&scene, 512);
@@ -125,6 +125,34 @@ fn textures_are_averaged_and_holes_shrink_patches() {
     let centre = masked.centre();
     assert!(masked.trace(DVec3::new(0.75, 0.5, 1.0) - centre, DVec3::NEG_Z).is_none());
     assert!(masked.trace(DVec3::new(0.25, 0.5, 1.0) - centre, DVec3::NEG_Z).is_some());
+}
+
+/// The second set of coordinates is the first one turned by a right angle, so that the halves are top and bottom; a
+/// transform that turns them back makes them left and right again.
+#[test]
+fn the_second_set_and_transforms_count_in_points_and_means() {
+    let mut scene = square(DAffine3::IDENTITY, false);
+    let rgba = vec![255, 255, 255, 255, 0, 0, 0, 255];
+    scene.images = vec![Arc::new(TextureImage { name: "halves".into(), width: 2, height: 1, rgba })];
+    let mesh = &mut scene.meshes[0];
+    mesh.texcoords = None;
+    mesh.second_texcoords = Some(mesh.positions.iter().map(|p| [p[1], 1.0 - p[0]]).collect());
+    let texture = TextureRef { wrap: [Wrap::Clamp; 2], nearest: true, set: 1, ..TextureRef::of(0) };
+    // u = y, v = 1 - x; turned counter-clockwise by a right angle: u' = v = 1 - x, v' = -u.
+    let turned = TextureTransform { rotation: std::f64::consts::FRAC_PI_2, ..TextureTransform::default() };
+    for (transform, white) in [(TextureTransform::default(), [0.7, 0.2]), (turned, [0.7, 0.8])] {
+        let texture = TextureRef { transform, ..texture.clone() };
+        let reflectance = Texel { factor: Rgb::grey(0.8), texture: Some(texture) };
+        scene.materials[0].surface = Surface::Lambertian { reflectance };
+        assert_eq!(scene.validate(), []);
+        let p = patches(&scene, 512);
+        let mean = p.mean_albedo().g;
+        assert!((mean - 0.4).abs() < 0.01, "{mean}");
+        for (at, expected) in [(white, 0.8), ([1.0 - white[0], 1.0 - white[1]], 0.0)] {
+            let hit = p.trace(DVec3::new(at[0], at[1], 1.0) - p.centre(), DVec3::NEG_Z).unwrap();
+            assert_eq!(p.color_at(hit.triangle, hit.u, hit.v).g, expected, "{at:?}");
+        }
+    }
 }
 
 #[test]

@@ -127,7 +127,7 @@ proptest! {
         let wrap = wraps.map(|w| [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][w]);
         let encoding = if linear { Encoding::Linear } else { Encoding::Srgb };
         for (u, v) in [(u, v), (v, u), (v, v)] {
-            let (color, alpha) = lookup(&image, &TextureRef { image: 0, wrap, nearest }, encoding, u, v);
+            let (color, alpha) = lookup(&image, &TextureRef { wrap, nearest, ..TextureRef::of(0) }, encoding, u, v);
             let range = -1e-12..=1.0 + 1e-12;
             for c in color.to_array().into_iter().chain([alpha]) {
                 prop_assert!(range.contains(&c), "{c} at ({u}, {v})");
