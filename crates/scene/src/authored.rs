@@ -129,14 +129,16 @@ impl Material {
 pub struct Texel {
     /// Linear factor.
     pub factor: Rgb,
-    /// Texture of colours, sRGB-encoded, multiplied by the factor.
+    /// Factor of the texture's alpha channel, in [0, 1]; it counts where [`Opacity`] asks for alpha.
+    pub alpha: f64,
+    /// Texture of colours, sRGB-encoded, and alpha, multiplied by the factors.
     pub texture: Option<TextureRef>,
 }
 
 impl Texel {
     /// The same colour everywhere.
     pub fn constant(factor: Rgb) -> Self {
-        Self { factor, texture: None }
+        Self { factor, alpha: 1.0, texture: None }
     }
 }
 
@@ -215,7 +217,7 @@ pub enum Opacity {
         /// Alpha threshold, 0.5 by default in glTF.
         cutoff: f32,
     },
-    /// Present by chance, with alpha as the probability: what is behind shows through.
+    /// Present by chance, with alpha as the probability: what is behind shows through. Many rays see the mean.
     Blend,
 }
 

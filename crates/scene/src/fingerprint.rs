@@ -46,10 +46,17 @@ impl PatchScene {
     /// Holes let rays through at full resolution: the mask itself decides where light goes, not only its mean.
     fn holes(&self, index: usize, t: &Triangle, masks: &mut [Option<u64>], hash: &mut Hash) {
         let material = &self.materials[t.material as usize];
-        let texture = base_texel(&material.surface).texture.as_ref();
-        let (Opacity::Mask { cutoff }, Some(texture)) = (material.opacity, texture) else { return hash.word(0) };
-        hash.word(1);
-        hash.floats(&[cutoff]);
+        match material.opacity {
+            Opacity::Opaque => return hash.word(0),
+            Opacity::Mask { cutoff } => {
+                hash.word(1);
+                hash.floats(&[cutoff]);
+            }
+            Opacity::Blend => hash.word(2),
+        }
+        let texel = base_texel(&material.surface);
+        hash.double(texel.alpha);
+        let Some(texture) = &texel.texture else { return };
         texture.wrap.iter().for_each(|w| hash.word(*w as u64));
         hash.word(u64::from(texture.nearest));
         let TextureTransform { offset, rotation, scale } = texture.transform;
@@ -174,7 +181,7 @@ mod tests {
 
     use super::*;
     use crate::authored::{
-        EnvironmentMap, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, Texel, TextureRef, Wrap,
+        EnvironmentMap, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, Texel, TextureRef,
     };
     use crate::builtin;
     use crate::patch::{PatchBudget, PatchOptions};
@@ -300,12 +307,27 @@ mod tests {
         let texture = Some(TextureRef { nearest: true, ..TextureRef::of(0) });
         base.meshes.iter_mut().for_each(|m| m.texcoords = Some(m.positions.iter().map(|p| [p[0], p[1]]).collect()));
         for material in &mut base.materials {
-            material.surface =
-                Surface::Lambertian { reflectance: Texel { factor: Rgb::grey(0.5), texture: texture.clone() } };
+            material.surface = Surface::Lambertian {
+                reflectance: Texel { factor: Rgb::grey(0.5), alpha: 1.0, texture: texture.clone() },
+            };
             material.opacity = Opacity::Mask { cutoff: 0.5 };
         }
         shows("the mask", &base, |s| s.images[0] = Arc::new(picture(vec![255, 255, 255, 0, 255, 255, 255, 255])));
         shows("the cutoff", &base, |s| s.materials[0].opacity = Opacity::Mask { cutoff: 0.4 });
+        shows("blending", &base, |s| s.materials[0].opacity = Opacity::Blend);
+        let alpha = |s: &mut Scene, alpha| {
+            s.materials[0].opacity = Opacity::Blend;
+            let Surface::Lambertian { reflectance } = &mut s.materials[0].surface else { panic!() };
+            reflectance.alpha = alpha;
+        };
+        let mut blended = base.clone();
+        alpha(&mut blended, 0.5);
+        // The thinner surface has other areas already; here both are as good as absent.
+        shows("alpha", &blended, |s| alpha(s, 0.25));
+        shows("where the mask lies", &base, |s| {
+            let Surface::Lambertian { reflectance } = &mut s.materials[0].surface else { panic!() };
+            reflectance.texture.as_mut().unwrap().transform.offset = [1.0, 0.0];
+        });
         shows("no holes", &base, |s| s.materials.iter_mut().for_each(|m| m.opacity = Opacity::Opaque));
     }
 

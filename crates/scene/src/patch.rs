@@ -17,6 +17,7 @@ use crate::environment::EnvironmentLight;
 use crate::geom::area_vector_2;
 use crate::punctual::PointLight;
 use crate::rgb::Rgb;
+use crate::sample::stream::{mix, to_unit};
 use crate::texture::{self, Encoding};
 
 /// How finely a scene is cut.
@@ -217,10 +218,10 @@ impl PatchScene {
             attributes,
             second_texcoords,
             tangents,
-            materials: scene.materials.clone(),
+            materials: without_needless_alpha(scene),
             images: scene.images.clone(),
             kernel: twinray_rays::Bvh::build(&kernel_input),
-            holes: scene.materials.iter().any(|m| m.opacity != Opacity::Opaque),
+            holes: false,
             passes: false,
             panes: scene.materials.iter().any(|m| m.transmission.as_ref().is_some_and(|t| t.volume.is_none())),
             environment: scene.environment.clone().map(|e| EnvironmentLight::new(e, radius)),
@@ -233,6 +234,7 @@ impl PatchScene {
             radius,
             degenerate: left_out,
         };
+        this.holes = this.materials.iter().any(|m| m.opacity != Opacity::Opaque);
         debug_assert_eq!(this.kernel.left_out(), 0, "a patch that no ray can meet");
         this.average_materials();
         Ok(this)
@@ -376,7 +378,8 @@ impl PatchScene {
         let cell = self.cell_of(patch);
         let mut place = triangle.cells.point(cell, s, t);
         if !self.coverage.is_empty() {
-            // 64 tries leave fewer than 2 % of the draws outside where a sixteenth of the cell is there.
+            // 64 tries leave fewer than 2 % of the draws outside where a sixteenth of the cell is there. Of a blended
+            // surface those are points of the cell like others, since nothing but a hash tells them apart.
             for _ in 0..64 {
                 if self.is_present(index, place[0], place[1]) {
                     break;
@@ -520,14 +523,36 @@ impl PatchScene {
         material.emission * self.texture_at(material.emission_texture.as_ref(), triangle, Encoding::Srgb, u, v).0
     }
 
-    /// True unless the point lies in a hole of an alpha-masked material.
+    /// True unless the point lies in a hole of an alpha-masked material, or is one of those that a blended material
+    /// lets light and sight through.
+    ///
+    /// Of a blended surface each point is there or not, by a hash of its place with alpha as the probability: one ray
+    /// meets it or passes, always the same way at the same place, and many rays see the mean of both. So a blended
+    /// surface is one with very fine holes, and areas, densities and deposits are those of what is there.
     #[inline]
     pub fn is_present(&self, triangle: u32, u: f64, v: f64) -> bool {
         let material = &self.materials[self.triangles[triangle as usize].material as usize];
-        let Opacity::Mask { cutoff } = material.opacity else { return true };
+        match material.opacity {
+            Opacity::Opaque => true,
+            Opacity::Mask { cutoff } => self.alpha_at(triangle, u, v) >= f64::from(cutoff),
+            Opacity::Blend => chance_at(triangle, u, v) < self.alpha_at(triangle, u, v),
+        }
+    }
+
+    /// Share of the surface around a point that is there, in [0, 1].
+    fn presence_at(&self, triangle: u32, u: f64, v: f64) -> f64 {
+        let material = &self.materials[self.triangles[triangle as usize].material as usize];
+        match material.opacity {
+            Opacity::Blend => self.alpha_at(triangle, u, v).clamp(0.0, 1.0),
+            _ => f64::from(u8::from(self.is_present(triangle, u, v))),
+        }
+    }
+
+    /// Alpha of the base colour at a point.
+    fn alpha_at(&self, triangle: u32, u: f64, v: f64) -> f64 {
+        let material = &self.materials[self.triangles[triangle as usize].material as usize];
         let texel = base_texel(&material.surface);
-        texel.texture.is_none()
-            || self.texture_at(texel.texture.as_ref(), triangle, Encoding::Srgb, u, v).1 >= f64::from(cutoff)
+        texel.alpha * self.texture_at(texel.texture.as_ref(), triangle, Encoding::Srgb, u, v).1
     }
 
     /// Normal for display at a point of a triangle's side: interpolated vertex normals where there are any.
@@ -643,6 +668,7 @@ impl PatchScene {
             (means.metallic, means.roughness) = ((metallic * mean.b) as f32, (roughness * mean.g) as f32);
         }
         if !textured {
+            means.coverage = vec![least_coverage(self.presence_at(triangle, 0.25, 0.25))];
             return means;
         }
         let count = t.cells.count();
@@ -653,18 +679,18 @@ impl PatchScene {
             let (mut color, mut emission, mut present) = (Rgb::BLACK, Rgb::BLACK, 0.0);
             for k in 0..n {
                 let [u, v] = spread_point(&t.cells, cell, k);
-                if !self.is_present(triangle, u, v) {
-                    continue;
+                // What is there reflects and emits: where less is there, its colour counts for less.
+                let presence = self.presence_at(triangle, u, v);
+                if presence > 0.0 {
+                    present += presence;
+                    color += self.color_at(triangle, u, v) * presence;
+                    emission += self.emission_at(triangle, Side::Front, u, v) * presence;
                 }
-                present += 1.0;
-                color += self.color_at(triangle, u, v);
-                emission += self.emission_at(triangle, Side::Front, u, v);
             }
-            let there = f64::max(present, 1.0);
+            let there = if present > 0.0 { present } else { 1.0 };
             colors.push((color / there).to_f32());
             emissions.push((emission / there).to_f32());
-            // A ray can still meet what no sample met: the area must not be zero.
-            coverages.push((present / f64::from(n)).max(1e-3) as f32);
+            coverages.push(least_coverage(present / f64::from(n)));
         }
         (means.color, means.emission, means.coverage) = (colors, emissions, coverages);
         means
@@ -684,6 +710,39 @@ impl PatchScene {
         let [a, b] = texture.transform.scale;
         Some(0.5 * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0)).abs() * (a * b).abs())
     }
+}
+
+/// A ray can still meet what no sample met: the area must not be zero.
+fn least_coverage(share: f64) -> f32 {
+    if share > 0.0 { share as f32 } else { 1e-3 }
+}
+
+/// A number in [0, 1) that belongs to a point of a triangle.
+fn chance_at(triangle: u32, u: f64, v: f64) -> f64 {
+    let bits = mix(mix(u64::from(triangle).wrapping_add(PLACES) ^ mix(u.to_bits())) ^ v.to_bits());
+    to_unit(mix(bits))
+}
+
+/// Keeps the hash of points apart from those of random streams.
+const PLACES: u64 = 0x7477_696e_2061_6c70;
+
+/// The materials, where masks and blending without a transparent texel are none: rays need not ask for them.
+fn without_needless_alpha(scene: &Scene) -> Vec<Material> {
+    let mut least: Vec<Option<f64>> = vec![None; scene.images.len()];
+    let mut least_of = |texture: &TextureRef| {
+        let alphas = || scene.images[texture.image].rgba.chunks_exact(4).map(|t| t[3]);
+        *least[texture.image].get_or_insert_with(|| f64::from(alphas().min().unwrap_or(255)) / 255.0)
+    };
+    let mut materials = scene.materials.clone();
+    for material in materials.iter_mut().filter(|m| m.opacity != Opacity::Opaque) {
+        let texel = base_texel(&material.surface);
+        let alpha = texel.alpha * texel.texture.as_ref().map_or(1.0, &mut least_of);
+        let needed = if let Opacity::Mask { cutoff } = material.opacity { f64::from(cutoff) } else { 1.0 };
+        if alpha >= needed {
+            material.opacity = Opacity::Opaque;
+        }
+    }
+    materials
 }
 
 /// Point `k` of a cell's additive recurrence (Roberts's R2 sequence): even for any number of points, and on no

@@ -6,6 +6,7 @@ use crate::authored::{
     Environment, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface,
     TextureImage, TextureTransform,
 };
+use crate::patch::base_texel;
 use crate::rgb::Rgb;
 use crate::texture::srgb_to_linear;
 
@@ -89,6 +90,10 @@ impl Scene {
                 if ![offset, [rotation, 0.0], scale].iter().flatten().all(|x| x.is_finite()) {
                     fault(element(), "a texture's transform is not finite".into());
                 }
+            }
+            let alpha = base_texel(&material.surface).alpha;
+            if !(0.0..=1.0).contains(&alpha) {
+                fault(element(), format!("alpha {alpha}, expected 0 to 1"));
             }
             if let Some(t) = &material.transmission {
                 if !(0.0..=1.0).contains(&t.factor) {
@@ -227,7 +232,7 @@ fn brightest_texel(image: &TextureImage) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::authored::{EnvironmentMap, Instance, Material, Mesh, Texel, TextureRef, Wrap};
+    use crate::authored::{EnvironmentMap, Instance, Material, Mesh, Texel, TextureRef};
     use glam::DAffine3;
     use std::sync::Arc;
 
@@ -317,7 +322,7 @@ mod tests {
     #[test]
     fn two_lobes_share_the_light_of_the_brightest_texel() {
         let texture = TextureRef { nearest: true, ..TextureRef::of(0) };
-        let diffuse = Texel { factor: Rgb::WHITE, texture: Some(texture) };
+        let diffuse = Texel { factor: Rgb::WHITE, alpha: 1.0, texture: Some(texture) };
         let surface = Surface::Phong { diffuse, specular: Rgb::grey(0.5), exponent: 10.0 };
         for (byte, faults) in [(100u8, 0), (255, 1)] {
             let rgba = vec![byte, byte, byte, 255];

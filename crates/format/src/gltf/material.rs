@@ -28,7 +28,6 @@ pub(super) struct Materials {
     /// Picture of each image of the file, `None` if it cannot be used.
     images: HashMap<usize, Option<usize>>,
     clamp: Clamp,
-    blended: Vec<String>,
     transmissive: Vec<String>,
     unread_maps: Vec<String>,
 }
@@ -67,7 +66,6 @@ impl Materials {
                 context.sum_up("materials", format!("{message}: {}", name_list(names)));
             }
         };
-        report(&self.blended, "alphaMode BLEND is read as opaque");
         report(&self.transmissive, "transmission lets light straight through, without refraction or tint");
         report(&self.unread_maps, "maps that are not read (normal, occlusion, specular, transmission)");
         (self.list, self.pictures)
@@ -92,6 +90,7 @@ impl Reader<'_, '_> {
         let color = self.colour(&pbr, "baseColorFactor", [1.0; 4], 1.0);
         let mut base_color = Texel {
             factor: Rgb::new(color[0], color[1], color[2]),
+            alpha: color[3],
             texture: self.texture(pbr.get("baseColorTexture")),
         };
         let limit = self.context.limits.max_reflectance;
@@ -130,7 +129,7 @@ impl Reader<'_, '_> {
         let emission_texture = if emission.is_black() { None } else { self.texture(element.get("emissiveTexture")) };
         let transmissive = self.transmits(element);
         self.note_unread(element, transmissive, &name);
-        let opacity = self.opacity(element, &name);
+        let opacity = self.opacity(element);
         let two_sided = element.flag("doubleSided");
         let transmission = transmissive.then_some(Transmission { factor: 1.0, texture: None, volume: None });
         let normal_map = None;
@@ -158,16 +157,13 @@ impl Reader<'_, '_> {
         1.5
     }
 
-    fn opacity(&mut self, element: &Element<'_>, name: &str) -> Opacity {
+    fn opacity(&mut self, element: &Element<'_>) -> Opacity {
         match element.text("alphaMode") {
             Ok(None | Some("OPAQUE")) => Opacity::Opaque,
             Ok(Some("MASK")) => {
                 Opacity::Mask { cutoff: self.number(element, "alphaCutoff", 0.5, 0.0..=f64::MAX) as f32 }
             }
-            Ok(Some("BLEND")) => {
-                self.materials.blended.push(name.to_owned());
-                Opacity::Opaque
-            }
+            Ok(Some("BLEND")) => Opacity::Blend,
             Ok(Some(_)) | Err(_) => {
                 self.context.warn(&element.path, "alphaMode is none of OPAQUE, MASK and BLEND; read as OPAQUE");
                 Opacity::Opaque

@@ -7,7 +7,9 @@ use std::collections::BTreeSet;
 
 use glam::{DAffine3, DMat3};
 use serde_json::{Map, Value, json};
-use twinray_scene::{Camera, Environment, Material, Mesh, Opacity, Projection, Rgb, Scene, Surface, TextureRef, Wrap};
+use twinray_scene::{
+    Camera, Environment, Material, Mesh, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureRef, Wrap,
+};
 
 use crate::png::encode_rgba;
 
@@ -175,7 +177,7 @@ impl Writer {
         let mut extensions = Map::new();
         match &material.surface {
             Surface::Lambertian { reflectance } => {
-                out["pbrMetallicRoughness"] = self.pbr(reflectance.factor, &reflectance.texture, 0.0, 1.0);
+                out["pbrMetallicRoughness"] = self.pbr(reflectance, 0.0, 1.0);
                 extensions.insert("KHR_materials_specular".into(), json!({ "specularFactor": 0.0 }));
             }
             Surface::MetallicRoughness {
@@ -187,7 +189,7 @@ impl Writer {
                 specular_color,
                 ior,
             } => {
-                let mut pbr = self.pbr(base_color.factor, &base_color.texture, *metallic, *roughness);
+                let mut pbr = self.pbr(base_color, *metallic, *roughness);
                 if let Some(texture) = metallic_roughness_texture {
                     pbr["metallicRoughnessTexture"] = self.texture(texture);
                 }
@@ -204,7 +206,7 @@ impl Writer {
             Surface::Phong { diffuse, specular, exponent } => {
                 // α = √(2/(n + 2)) and α = roughness². The lobe's colour is F0, 0.04 × the specular colour.
                 let roughness = (2.0 / (exponent + 2.0)).powf(0.25);
-                out["pbrMetallicRoughness"] = self.pbr(diffuse.factor, &diffuse.texture, 0.0, roughness);
+                out["pbrMetallicRoughness"] = self.pbr(diffuse, 0.0, roughness);
                 let color = (*specular / 0.04).to_array();
                 extensions.insert("KHR_materials_specular".into(), json!({ "specularColorFactor": color }));
                 let original = json!({ "specular": specular.to_array(), "exponent": exponent });
@@ -215,9 +217,13 @@ impl Writer {
         if material.two_sided {
             out["doubleSided"] = json!(true);
         }
-        if let Opacity::Mask { cutoff } = material.opacity {
-            out["alphaMode"] = json!("MASK");
-            out["alphaCutoff"] = json!(cutoff);
+        match material.opacity {
+            Opacity::Opaque => {}
+            Opacity::Mask { cutoff } => {
+                out["alphaMode"] = json!("MASK");
+                out["alphaCutoff"] = json!(cutoff);
+            }
+            Opacity::Blend => out["alphaMode"] = json!("BLEND"),
         }
         if material.transmission.is_some() {
             extensions.insert("KHR_materials_transmission".into(), json!({ "transmissionFactor": 1.0 }));
@@ -235,8 +241,8 @@ impl Writer {
         out
     }
 
-    fn pbr(&mut self, factor: Rgb, texture: &Option<TextureRef>, metallic: f64, roughness: f64) -> Value {
-        let color = [factor.r, factor.g, factor.b, 1.0];
+    fn pbr(&mut self, Texel { factor, alpha, texture }: &Texel, metallic: f64, roughness: f64) -> Value {
+        let color = [factor.r, factor.g, factor.b, *alpha];
         let mut pbr = json!({ "baseColorFactor": color, "metallicFactor": metallic, "roughnessFactor": roughness });
         if let Some(texture) = texture {
             pbr["baseColorTexture"] = self.texture(texture);

@@ -144,7 +144,7 @@ impl Materials {
             (None, true) => Rgb::grey(MISSING_REFLECTANCE),
             (None, false) => Rgb::BLACK,
         };
-        let mut diffuse = Texel { factor: entry.diffuse.unwrap_or(default), texture };
+        let mut diffuse = Texel { factor: entry.diffuse.unwrap_or(default), alpha: 1.0, texture };
         self.clamp.apply(&mut diffuse, &self.pictures, limit, &entry.name);
 
         let (specular, exponent) = (entry.specular.unwrap_or(Rgb::BLACK), entry.exponent.unwrap_or(0.0));

@@ -165,7 +165,8 @@ fn as_phong(surface: &Surface) -> (Texel, Rgb, Option<f64>) {
             let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2);
             let dielectric = (*specular_color * f0).map(|c| c.min(1.0)) * *specular;
             let lobe = dielectric.lerp(base_color.factor, *metallic);
-            let diffuse = Texel { factor: base_color.factor * (1.0 - metallic), texture: base_color.texture.clone() };
+            let diffuse =
+                Texel { factor: base_color.factor * (1.0 - metallic), alpha: 1.0, texture: base_color.texture.clone() };
             // α = roughness², and a Phong lobe of exponent 2/α² − 2 has about its width (Walter et al. 2007, §5.2).
             let alpha = (roughness * roughness).max(1e-3);
             (diffuse, lobe, Some((2.0 / (alpha * alpha) - 2.0).max(1e-3)))

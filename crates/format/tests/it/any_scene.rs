@@ -18,10 +18,14 @@ fn name() -> impl Strategy<Value = String> {
     prop::collection::vec(any::<char>(), 1..6).prop_map(|c| c.into_iter().collect())
 }
 
+fn texel() -> impl Strategy<Value = Texel> {
+    (rgb(0.98), 0.0..=1.0f64).prop_map(|(factor, alpha)| Texel { alpha, ..Texel::constant(factor) })
+}
+
 fn surface() -> impl Strategy<Value = Surface> {
-    let coated = (rgb(0.98), 0.0..=1.0f64, 0.0..=1.0f64, 0.0..=1.0f64, rgb(1.0), 1.0..3.0f64).prop_map(
-        |(color, metallic, roughness, specular, specular_color, ior)| Surface::MetallicRoughness {
-            base_color: Texel::constant(color),
+    let coated = (texel(), 0.0..=1.0f64, 0.0..=1.0f64, 0.0..=1.0f64, rgb(1.0), 1.0..3.0f64).prop_map(
+        |(base_color, metallic, roughness, specular, specular_color, ior)| Surface::MetallicRoughness {
+            base_color,
             metallic,
             roughness,
             metallic_roughness_texture: None,
@@ -31,23 +35,27 @@ fn surface() -> impl Strategy<Value = Surface> {
         },
     );
     prop_oneof![
-        rgb(0.98).prop_map(|color| Surface::Lambertian { reflectance: Texel::constant(color) }),
+        texel().prop_map(|reflectance| Surface::Lambertian { reflectance }),
         coated.prop_filter("a surface without lobe is read as Lambertian", |s| {
             !matches!(s, Surface::MetallicRoughness { specular, metallic, .. } if *specular == 0.0 && *metallic == 0.0)
         }),
     ]
 }
 
+fn opacity() -> impl Strategy<Value = Opacity> {
+    prop_oneof![Just(Opacity::Opaque), Just(Opacity::Blend), (0.0..2.0f32).prop_map(|cutoff| Opacity::Mask { cutoff })]
+}
+
 fn material() -> impl Strategy<Value = Material> {
     let emission = prop_oneof![Just(Rgb::BLACK), rgb(1.0), rgb(1e6)];
-    (name(), surface(), emission, any::<bool>(), any::<bool>()).prop_map(
-        |(name, surface, emission, two_sided, transmissive)| Material {
+    (name(), surface(), emission, any::<bool>(), any::<bool>(), opacity()).prop_map(
+        |(name, surface, emission, two_sided, transmissive, opacity)| Material {
             name,
             surface,
             emission,
             two_sided,
             transmission: transmissive.then_some(Transmission { factor: 1.0, texture: None, volume: None }),
-            opacity: Opacity::Opaque,
+            opacity,
             ..Material::default()
         },
     )
@@ -128,7 +136,8 @@ proptest! {
             prop_assert_eq!((&m.name, &m.positions, &m.triangles), (&n.name, &n.positions, &n.triangles));
             prop_assert_eq!((&m.normals, &m.texcoords), (&n.normals, &n.texcoords));
             let (m, n) = (&again.materials[m.material], &scene.materials[n.material]);
-            prop_assert_eq!((&m.name, m.two_sided, m.transmission.is_some()), (&n.name, n.two_sided, n.transmission.is_some()));
+            prop_assert_eq!((&m.name, m.two_sided, m.opacity), (&n.name, n.two_sided, n.opacity));
+            prop_assert_eq!(m.transmission.is_some(), n.transmission.is_some());
             for c in 0..3 {
                 prop_assert!((m.emission[c] - n.emission[c]).abs() <= 1e-12 * n.emission[c], "{:?} {:?}", m.emission, n.emission);
             }

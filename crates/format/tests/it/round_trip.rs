@@ -17,6 +17,7 @@ fn everything() -> Scene {
     let image = TextureImage { name: "tiles".into(), width: 2, height: 2, rgba };
     let textured = |factor| Texel {
         factor,
+        alpha: 0.75,
         texture: Some(TextureRef { wrap: [Wrap::Mirror, Wrap::Clamp], nearest: true, ..TextureRef::of(0) }),
     };
     let material = |name: &str, surface| Material { name: name.into(), surface, ..Material::default() };

@@ -12,7 +12,7 @@ use twinray_scene::{PatchId, PatchScene, Scene, builtin};
 use twinray_solve::{Params, PatchLight, Solver};
 use twinray_testkit::ztest::Mean;
 
-use super::reference::{cut, mean_over};
+use super::reference::{blended_plates, cut, mean_over};
 
 const SEEDS: u64 = 3;
 /// Materials of a smaller share of the area are one group: few paths on a dark corner are too skewed for a z-test.
@@ -74,6 +74,12 @@ fn agrees(authored: &Scene, coarse: usize, rays: u64, paths_per_patch: u32) {
 #[test]
 fn in_the_cornell_box() {
     agrees(&builtin::cornell(false), 2000, 500_000, 4000);
+}
+
+/// Veils scatter, shine and let through, each by its alpha.
+#[test]
+fn through_veils() {
+    agrees(&blended_plates(), 500, 400_000, 4000);
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn textures_are_averaged_and_holes_shrink_patches() {
     })];
     let texture = TextureRef { wrap: [Wrap::Clamp; 2], nearest: true, ..TextureRef::of(0) };
     scene.materials[0].surface =
-        Surface::Lambertian { reflectance: Texel { factor: Rgb::grey(0.8), texture: Some(texture) } };
+        Surface::Lambertian { reflectance: Texel { factor: Rgb::grey(0.8), alpha: 1.0, texture: Some(texture) } };
     let opaque = patches(&scene, 512);
     let mean = opaque.mean_albedo().g;
     assert!((mean - 0.4).abs() < 0.01, "{mean}");
@@ -125,6 +125,84 @@ fn textures_are_averaged_and_holes_shrink_patches() {
     let centre = masked.centre();
     assert!(masked.trace(DVec3::new(0.75, 0.5, 1.0) - centre, DVec3::NEG_Z).is_none());
     assert!(masked.trace(DVec3::new(0.25, 0.5, 1.0) - centre, DVec3::NEG_Z).is_some());
+}
+
+/// A square whose left half is white and dense, the right black and thin.
+fn veil(alpha: f64) -> Scene {
+    let mut scene = square(DAffine3::IDENTITY, false);
+    // Sixteen texels in a row, so that means are taken over 64 points.
+    let rgba = (0..256).flat_map(|i| if i % 16 < 8 { [255, 255, 255, 255] } else { [0, 0, 0, 51] }).collect();
+    scene.images = vec![Arc::new(TextureImage { name: "veil".into(), width: 16, height: 16, rgba })];
+    let texture = Some(TextureRef { wrap: [Wrap::Clamp; 2], nearest: true, ..TextureRef::of(0) });
+    scene.materials[0].surface =
+        Surface::Lambertian { reflectance: Texel { factor: Rgb::grey(0.9), alpha, texture: texture.clone() } };
+    scene.materials[0].emission = Rgb::WHITE;
+    scene.materials[0].emission_texture = texture;
+    scene.materials[0].opacity = Opacity::Blend;
+    scene
+}
+
+/// Alpha is 0.8 on the left and 0.16 on the right: rays meet the surface so often, points are drawn in this ratio,
+/// and what is there is white by 5 in 6.
+#[test]
+fn blended_surfaces_are_there_as_often_as_alpha_says() {
+    const N: u32 = 20_000;
+    let scene = veil(0.8);
+    let p = patches(&scene, 2048);
+    assert!((p.total_area() - 0.48).abs() < 0.005, "{}", p.total_area());
+    // What is there on the left shines: half of the square × 0.8.
+    let light = p.patches().map(|k| p.area(k) * p.emission(k).g).sum::<f64>();
+    assert!((light - 0.4).abs() < 0.005, "{light}");
+    let p = patches(&scene, 2);
+    assert_eq!(p.len(), 2);
+    let mut random = crate::sample::Stream::new(1, 2, 3);
+    let (mut met, mut drawn) = ([0u32; 2], [0u32; 2]);
+    for _ in 0..N {
+        let [x, y] = [0; 2].map(|_| random.uniform());
+        let right = usize::from(x >= 0.5);
+        let origin = DVec3::new(x, y, 1.0) - p.centre();
+        let hit = p.trace(origin, DVec3::NEG_Z);
+        met[right] += u32::from(hit.is_some());
+        assert_eq!(hit.map(|h| h.u), p.trace(origin, DVec3::NEG_Z).map(|h| h.u), "a place that changes its mind");
+        let patch = PatchId(u32::from(y > x));
+        let point = p.sample_point(patch, x, y, || random.uniform()) + p.centre();
+        drawn[usize::from(point.x >= 0.5)] += 1;
+    }
+    let half = f64::from(N) / 2.0;
+    for (count, alpha) in [(met[0], 0.8), (met[1], 0.16)] {
+        // Binomial, given a random number of tries: 5 standard deviations, a false alarm in 10⁶.
+        let z = (f64::from(count) - half * alpha) / (half * alpha).sqrt();
+        assert!(z.abs() < 5.0, "{met:?}, z {z}");
+    }
+    // Half of the draws are from each triangle. By area 3/4 of one and 1/4 of the other are on the left, so that
+    // 0.8 a / (0.8 a + 0.16 (1 - a)) of the points on it are: 15/16 and 5/8.
+    let left = f64::from(drawn[0]) / f64::from(N);
+    let z = (left - 0.5 * (15.0 / 16.0 + 5.0 / 8.0)) / (0.25 / f64::from(N)).sqrt();
+    assert!(z.abs() < 5.0, "{drawn:?}, z {z}");
+}
+
+#[test]
+fn alpha_factors_count_and_dense_surfaces_have_no_holes() {
+    let mut scene = veil(0.8);
+    assert!(patches(&scene, 2).holes);
+    scene.materials[0].opacity = Opacity::Mask { cutoff: 0.5 };
+    assert!((patches(&scene, 512).total_area() - 0.5).abs() < 0.02);
+    // 0.8 × 51/255 = 0.16 passes a cutoff of 0.15; then nothing is cut, and rays need not ask.
+    scene.materials[0].opacity = Opacity::Mask { cutoff: 0.15 };
+    assert!(!patches(&scene, 2).holes);
+    // Without a picture, or without coordinates, the factor is all there is.
+    let plain = |alpha| Surface::Lambertian { reflectance: Texel { alpha, ..Texel::constant(Rgb::grey(0.5)) } };
+    scene.materials[0].opacity = Opacity::Blend;
+    scene.materials[0].surface = plain(0.25);
+    assert!((patches(&scene, 512).total_area() - 0.25).abs() < 1e-6);
+    scene.materials[0].surface = plain(1.0);
+    assert!(!patches(&scene, 2).holes);
+    scene.materials[0].opacity = Opacity::Mask { cutoff: 0.5 };
+    scene.materials[0].surface = plain(0.25);
+    let p = patches(&scene, 2);
+    assert!(p.total_area() < 1e-2 && p.trace(DVec3::new(0.1, 0.2, 1.0), DVec3::NEG_Z).is_none());
+    scene.materials[0].surface = plain(1.5);
+    assert_eq!(scene.validate().len(), 1);
 }
 
 /// The second set of coordinates is the first one turned by a right angle, so that the halves are top and bottom; a
@@ -142,7 +220,7 @@ fn the_second_set_and_transforms_count_in_points_and_means() {
     let turned = TextureTransform { rotation: std::f64::consts::FRAC_PI_2, ..TextureTransform::default() };
     for (transform, white) in [(TextureTransform::default(), [0.7, 0.2]), (turned, [0.7, 0.8])] {
         let texture = TextureRef { transform, ..texture.clone() };
-        let reflectance = Texel { factor: Rgb::grey(0.8), texture: Some(texture) };
+        let reflectance = Texel { factor: Rgb::grey(0.8), alpha: 1.0, texture: Some(texture) };
         scene.materials[0].surface = Surface::Lambertian { reflectance };
         assert_eq!(scene.validate(), []);
         let p = patches(&scene, 512);
