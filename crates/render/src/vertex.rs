@@ -63,7 +63,7 @@ impl Vertex {
         let geometric = scene.normal(patch);
         let normal = match look {
             Look::Display => {
-                let smooth = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+                let smooth = scene.normal_at(hit, 0.0);
                 if smooth.dot(wo) > 0.0 { smooth } else { geometric }
             }
             _ => geometric,

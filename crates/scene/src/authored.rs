@@ -112,11 +112,15 @@ impl Material {
     /// Every use of an image.
     pub fn textures(&self) -> Vec<&TextureRef> {
         let surface = match &self.surface {
-            Surface::Lambertian { reflectance } => [&reflectance.texture, &None],
-            Surface::MetallicRoughness { base_color, metallic_roughness_texture, .. } => {
-                [&base_color.texture, metallic_roughness_texture]
-            }
-            Surface::Phong { diffuse, .. } => [&diffuse.texture, &None],
+            Surface::Lambertian { reflectance } => [&reflectance.texture, &None, &None, &None],
+            Surface::MetallicRoughness {
+                base_color,
+                metallic_roughness_texture,
+                specular_texture,
+                specular_color_texture,
+                ..
+            } => [&base_color.texture, metallic_roughness_texture, specular_texture, specular_color_texture],
+            Surface::Phong { diffuse, .. } => [&diffuse.texture, &None, &None, &None],
         };
         let passing = self.transmission.as_ref().and_then(|t| t.texture.as_ref());
         let bumps = self.normal_map.as_ref().map(|n| &n.texture);
@@ -162,8 +166,12 @@ pub enum Surface {
         metallic_roughness_texture: Option<TextureRef>,
         /// `KHR_materials_specular` factor (1 without the extension; 0 is purely Lambertian).
         specular: f64,
+        /// Linear texture whose alpha multiplies that factor.
+        specular_texture: Option<TextureRef>,
         /// `KHR_materials_specular` colour factor.
         specular_color: Rgb,
+        /// Texture of colours, sRGB-encoded, multiplied by that.
+        specular_color_texture: Option<TextureRef>,
         /// Index of refraction (1.5 without `KHR_materials_ior`).
         ior: f64,
     },

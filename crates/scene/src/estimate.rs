@@ -8,11 +8,10 @@ use twinray_rays::Bvh;
 
 use crate::authored::{Opacity, Scene, Surface, Texel};
 use crate::cells::Outline;
-use crate::patch::{
-    Attributes, PatchError, PatchOptions, Triangle, TriangleMeans, base_texel, bounds, cell_area, place,
-    rare_attributes,
-};
+use crate::means::{TriangleMeans, has_specular_textures};
+use crate::patch::{Attributes, PatchError, PatchOptions, Triangle, bounds, cell_area, place, rare_attributes};
 use crate::rgb::Rgb;
+use crate::surface::base_texel;
 
 /// What cutting a scene gives and takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +80,8 @@ pub fn estimate(scene: &Scene, options: PatchOptions) -> Result<Estimate, PatchE
     let [kernel, kernel_peak] = Bvh::expected_bytes(triangles);
     let [second, tangents] = rare_attributes(scene);
     let rare = if second { size_of::<Option<[[f32; 2]; 3]>>() } else { 0 }
-        + if tangents { size_of::<Option<[[f32; 4]; 3]>>() } else { 0 };
+        + if tangents { size_of::<Option<[[f32; 4]; 3]>>() } else { 0 }
+        + if scene.materials.iter().any(has_specular_textures) { size_of::<[f32; 4]>() } else { 0 };
     let fixed = triangles * (size_of::<Triangle>() + size_of::<Attributes>() + rare);
     let kernel_input = triangles * size_of::<[[f32; 3]; 3]>();
     let while_built = kernel_input + size_of::<u32>() * patches + kernel_peak;

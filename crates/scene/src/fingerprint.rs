@@ -5,11 +5,14 @@
 //! cameras, vertex normals and textures beyond the patches' means (for display only), and where the scene lies in
 //! the world. Called by whoever writes or checks stored light.
 
-use crate::authored::{Environment, Opacity, SkyLevel, SkyModel, Surface, TextureImage, TextureTransform};
+use crate::authored::{
+    Environment, Opacity, SkyLevel, SkyModel, Surface, TextureImage, TextureTransform, Transmission,
+};
 use crate::cells::Cells;
-use crate::patch::{PatchScene, Triangle, base_texel};
+use crate::patch::{PatchScene, Triangle};
 use crate::rgb::Rgb;
 use crate::sample::stream::mix;
+use crate::surface::base_texel;
 
 /// Raised whenever what is hashed, or its order, changes: old fingerprints then match nothing.
 const VERSION: u64 = 2;
@@ -27,7 +30,10 @@ impl PatchScene {
             t.vertices.iter().for_each(|v| hash.floats(v));
             hash.word(u64::from(t.two_sided));
             hash.cells(&t.cells);
-            hash.lobe(t, &self.materials[t.material as usize].surface);
+            let material = &self.materials[t.material as usize];
+            hash.passing(t, material.transmission.as_ref());
+            hash.lobe(t, &material.surface);
+            self.speculars.get(index).iter().for_each(|s| hash.floats(*s));
             self.holes(index, t, &mut masks, &mut hash);
         }
         hash.word(self.len() as u64);
@@ -151,6 +157,16 @@ impl Hash {
                 self.color(sky.ground);
             }
         }
+    }
+
+    /// What passes a material; nothing where light does not.
+    fn passing(&mut self, t: &Triangle, transmission: Option<&Transmission>) {
+        let Some(transmission) = transmission else { return };
+        // No kind of lobe has this number: what follows cannot be taken for one.
+        self.word(3);
+        self.floats(&[t.transmission]);
+        self.word(u64::from(transmission.volume.is_some()));
+        self.color(transmission.volume.map_or(Rgb::BLACK, |v| v.attenuation));
     }
 
     /// What a material does beside its base colour, which the patches hold.
@@ -289,6 +305,8 @@ mod tests {
             metallic,
             roughness,
             metallic_roughness_texture: None,
+            specular_texture: None,
+            specular_color_texture: None,
             specular: 1.0,
             specular_color: Rgb::WHITE,
             ior,

@@ -2,6 +2,7 @@
 pub mod authored;
 pub mod brdf;
 pub mod builtin;
+mod bumps;
 mod bvh;
 pub mod camera;
 pub mod cells;
@@ -10,12 +11,15 @@ pub mod environment;
 mod estimate;
 mod fingerprint;
 pub mod geom;
+mod means;
+mod mips;
 pub mod passing;
 pub mod patch;
 pub mod punctual;
 pub mod rgb;
 pub mod sample;
 mod sight;
+mod surface;
 pub mod texture;
 pub mod validate;
 
@@ -30,3 +34,4 @@ pub use estimate::{Estimate, estimate};
 pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
 pub use punctual::PointLight;
 pub use rgb::Rgb;
+pub use surface::SurfacePoint;

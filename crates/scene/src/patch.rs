@@ -3,22 +3,22 @@
 //! A [`PatchScene`] is immutable and holds everything that a ray can meet. Coordinates are relative to the
 //! scene's centre, in single precision where the ray kernel reads them: far from the origin f32 has no
 //! millimetres left. A two-sided triangle has two sets of patches back to back, each with its own state.
-//! Not here: the cells' arithmetic (`cells`), rays (`bvh`), light (solve).
+//! Not here: the cells' arithmetic (`cells`), means of textures (`means`), points (`surface`), rays (`bvh`), light (solve).
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::authored::{Material, Mesh, Opacity, Scene, Surface, TextureImage, TextureRef};
-use crate::brdf::{Brdf, Detail, Ggx, Passing, Phong, Scatter, Specular};
+use crate::authored::{Material, Mesh, Opacity, Scene, Surface, TextureImage};
+use crate::brdf::{Brdf, Detail, Scatter, Specular};
 use crate::cells::{Cells, Outline};
 use crate::environment::EnvironmentLight;
 use crate::geom::area_vector_2;
+use crate::mips::Mips;
 use crate::punctual::PointLight;
 use crate::rgb::Rgb;
-use crate::sample::stream::{mix, to_unit};
-use crate::texture::{self, Encoding};
+use crate::surface::{Appearance, without_needless_alpha};
 
 /// How finely a scene is cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,15 +127,19 @@ pub struct PatchScene {
     pub(crate) attributes: Vec<Attributes>,
     /// Per triangle, as its mesh has them; empty if no material asks.
     pub(crate) second_texcoords: Vec<Option<[[f32; 2]; 3]>>,
+    /// Per triangle: mean factor and colour of the lobe's reflectance; empty if no material has textures for it.
+    pub(crate) speculars: Vec<[f32; 4]>,
     /// Per triangle, in the world, with the sign of the bitangent; empty if no material asks.
     pub(crate) tangents: Vec<Option<[[f32; 4]; 3]>>,
     pub(crate) materials: Vec<Material>,
     pub(crate) images: Vec<Arc<TextureImage>>,
+    /// Per picture.
+    pub(crate) mips: Vec<Mips>,
     pub(crate) kernel: twinray_rays::Bvh,
     /// Whether any material has holes, which rays must ask about.
     pub(crate) holes: bool,
     /// Whether rays of the solver go on at some surfaces.
-    passes: bool,
+    pub(crate) passes: bool,
     /// Whether shadow rays pass some surfaces.
     panes: bool,
     pub(crate) environment: Option<EnvironmentLight>,
@@ -145,9 +149,9 @@ pub struct PatchScene {
     /// Per patch: mean base colour.
     pub(crate) base_color: Vec<[f32; 3]>,
     /// Per patch: mean emitted radiance; empty if nothing emits.
-    emission: Vec<[f32; 3]>,
+    pub(crate) emission: Vec<[f32; 3]>,
     /// Per patch: share of its cell that is there; empty if no material has holes.
-    coverage: Vec<f32>,
+    pub(crate) coverage: Vec<f32>,
     centre: DVec3,
     radius: f64,
     degenerate: usize,
@@ -220,6 +224,8 @@ impl PatchScene {
             tangents,
             materials: without_needless_alpha(scene),
             images: scene.images.clone(),
+            mips: scene.images.iter().map(|_| Mips::default()).collect(),
+            speculars: Vec::new(),
             kernel: twinray_rays::Bvh::build(&kernel_input),
             holes: false,
             passes: false,
@@ -424,7 +430,17 @@ impl PatchScene {
         if let (Surface::Lambertian { .. }, None) = (&material.surface, &material.transmission) {
             return Scatter { brdf: Brdf::Lambertian { reflectance: color }, specular: None };
         }
-        self.scatter_of(triangle, color, f64::from(t.metallic), f64::from(t.roughness), t.transmission, Detail::Patches)
+        let mut look = Appearance {
+            color,
+            metallic: f64::from(t.metallic),
+            roughness: f64::from(t.roughness),
+            transmission: f64::from(t.transmission),
+            ..Appearance::of(material)
+        };
+        if let Some(&[specular, r, g, b]) = self.speculars.get(triangle as usize) {
+            (look.specular, look.specular_color) = (f64::from(specular), Rgb::from_f32([r, g, b]));
+        }
+        self.scatter_of(triangle, &look, Detail::Patches)
     }
 
     /// The BRDF of a patch, as the solver sees it.
@@ -437,45 +453,6 @@ impl PatchScene {
     #[inline]
     pub fn specular(&self, patch: PatchId) -> Option<Specular> {
         if self.passes { self.scatter(patch).specular } else { None }
-    }
-
-    /// Scattering by a triangle's material, of what may vary over it: base colour, metalness, perceptual roughness and
-    /// share of the base that transmits.
-    pub fn scatter_of(
-        &self,
-        triangle: u32,
-        color: Rgb,
-        metallic: f64,
-        roughness: f64,
-        transmission: f32,
-        detail: Detail,
-    ) -> Scatter {
-        let t = &self.triangles[triangle as usize];
-        let material = &self.materials[t.material as usize];
-        let (brdf, ior, metallic) = match &material.surface {
-            Surface::Lambertian { .. } => (Brdf::Lambertian { reflectance: color }, 1.5, 0.0),
-            Surface::MetallicRoughness { specular, specular_color, ior, .. } => {
-                let ggx = Ggx::new(color, metallic, roughness, *specular, *specular_color, *ior);
-                (Brdf::Ggx(ggx), *ior, metallic)
-            }
-            Surface::Phong { specular, exponent, .. } => {
-                (Brdf::Phong(Phong::new(color, *specular, *exponent)), 1.5, 0.0)
-            }
-        };
-        let passing = material.transmission.as_ref().map(|x| Passing {
-            share: f64::from(transmission) * (1.0 - metallic),
-            color,
-            ior,
-            volume: x.volume,
-        });
-        Scatter::new(brdf, passing, detail)
-    }
-
-    /// What a surface does with light at a point: its base colour at full resolution.
-    pub fn scatter_at(&self, hit: &crate::SurfaceHit, detail: Detail) -> Scatter {
-        let t = &self.triangles[hit.triangle as usize];
-        let color = self.color_at(hit.triangle, hit.u, hit.v);
-        self.scatter_of(hit.triangle, color, f64::from(t.metallic), f64::from(t.roughness), t.transmission, detail)
     }
 
     /// True if the patch has what a single number does not tell of it: a lobe, or a base under a coat.
@@ -507,65 +484,6 @@ impl PatchScene {
         self.triangles[self.triangle_of(patch) as usize].material as usize
     }
 
-    /// Base colour at a point of a triangle, textures at full resolution.
-    pub fn color_at(&self, triangle: u32, u: f64, v: f64) -> Rgb {
-        let material = &self.materials[self.triangles[triangle as usize].material as usize];
-        let texel = base_texel(&material.surface);
-        texel.factor * self.texture_at(texel.texture.as_ref(), triangle, Encoding::Srgb, u, v).0
-    }
-
-    /// Emitted radiance at a point of a triangle's side, textures at full resolution.
-    pub fn emission_at(&self, triangle: u32, side: Side, u: f64, v: f64) -> Rgb {
-        let material = &self.materials[self.triangles[triangle as usize].material as usize];
-        if side == Side::Back || material.emission.is_black() {
-            return Rgb::BLACK;
-        }
-        material.emission * self.texture_at(material.emission_texture.as_ref(), triangle, Encoding::Srgb, u, v).0
-    }
-
-    /// True unless the point lies in a hole of an alpha-masked material, or is one of those that a blended material
-    /// lets light and sight through.
-    ///
-    /// Of a blended surface each point is there or not, by a hash of its place with alpha as the probability: one ray
-    /// meets it or passes, always the same way at the same place, and many rays see the mean of both. So a blended
-    /// surface is one with very fine holes, and areas, densities and deposits are those of what is there.
-    #[inline]
-    pub fn is_present(&self, triangle: u32, u: f64, v: f64) -> bool {
-        let material = &self.materials[self.triangles[triangle as usize].material as usize];
-        match material.opacity {
-            Opacity::Opaque => true,
-            Opacity::Mask { cutoff } => self.alpha_at(triangle, u, v) >= f64::from(cutoff),
-            Opacity::Blend => chance_at(triangle, u, v) < self.alpha_at(triangle, u, v),
-        }
-    }
-
-    /// Share of the surface around a point that is there, in [0, 1].
-    fn presence_at(&self, triangle: u32, u: f64, v: f64) -> f64 {
-        let material = &self.materials[self.triangles[triangle as usize].material as usize];
-        match material.opacity {
-            Opacity::Blend => self.alpha_at(triangle, u, v).clamp(0.0, 1.0),
-            _ => f64::from(u8::from(self.is_present(triangle, u, v))),
-        }
-    }
-
-    /// Alpha of the base colour at a point.
-    fn alpha_at(&self, triangle: u32, u: f64, v: f64) -> f64 {
-        let material = &self.materials[self.triangles[triangle as usize].material as usize];
-        let texel = base_texel(&material.surface);
-        texel.alpha * self.texture_at(texel.texture.as_ref(), triangle, Encoding::Srgb, u, v).1
-    }
-
-    /// Normal for display at a point of a triangle's side: interpolated vertex normals where there are any.
-    pub fn shading_normal(&self, triangle: u32, side: Side, u: f64, v: f64) -> DVec3 {
-        let flat = self.triangles[triangle as usize].normal;
-        let smooth = self.attributes[triangle as usize]
-            .normals
-            .map_or(flat, |n| (vec(n[0]) * (1.0 - u - v) + vec(n[1]) * u + vec(n[2]) * v).normalize_or(flat));
-        // Authors' normals may point either way on two-sided surfaces; the side decides.
-        let front = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
-        if side == Side::Front { front } else { -front }
-    }
-
     /// Triangle corners, in this scene's coordinates.
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         [0, 1, 2].map(|i| self.triangles[triangle as usize].vertex(i))
@@ -578,203 +496,21 @@ impl PatchScene {
 
     /// Bytes of the ray kernel and of the patches' constants.
     pub fn bytes(&self) -> [usize; 2] {
-        let rare = size_of_val(self.second_texcoords.as_slice()) + size_of_val(self.tangents.as_slice());
+        let rare = size_of_val(self.second_texcoords.as_slice())
+            + size_of_val(self.tangents.as_slice())
+            + size_of_val(self.speculars.as_slice());
         let per_triangle = size_of::<Triangle>() + size_of::<Attributes>();
         let per_patch =
             4 + 12 + if self.emission.is_empty() { 0 } else { 12 } + if self.coverage.is_empty() { 0 } else { 4 };
         [self.kernel.bytes(), self.triangles.len() * per_triangle + rare + self.len() * per_patch]
     }
-
-    fn texture_at(
-        &self,
-        texture: Option<&TextureRef>,
-        triangle: u32,
-        encoding: Encoding,
-        u: f64,
-        v: f64,
-    ) -> (Rgb, f64) {
-        let Some((texture, t)) = texture.and_then(|t| Some((t, self.texcoords(triangle, t)?))) else {
-            return (Rgb::WHITE, 1.0);
-        };
-        let at = |k: usize| f64::from(t[0][k]) * (1.0 - u - v) + f64::from(t[1][k]) * u + f64::from(t[2][k]) * v;
-        texture::lookup(&self.images[texture.image], texture, encoding, at(0), at(1))
-    }
-
-    /// The triangle's texture coordinates of the set that `texture` names, if it has them.
-    pub(crate) fn texcoords(&self, triangle: u32, texture: &TextureRef) -> Option<[[f32; 2]; 3]> {
-        let triangle = triangle as usize;
-        if texture.set == 0 {
-            return self.attributes[triangle].texcoords;
-        }
-        self.second_texcoords.get(triangle).copied().flatten()
-    }
-
-    /// Fills the patches' means of textures: colour, emission, coverage; and the triangles' metalness and roughness.
-    fn average_materials(&mut self) {
-        let texels = self.images.iter().map(|i| f64::from(i.width) * f64::from(i.height)).fold(0.0, f64::max);
-        let means: Vec<TriangleMeans> =
-            (0..self.triangles.len() as u32).into_par_iter().map(|i| self.triangle_means(i, texels)).collect();
-        let holes = self.holes;
-        let emits = self.materials.iter().any(|m| !m.emission.is_black());
-        for (t, means) in self.triangles.iter_mut().zip(means) {
-            (t.metallic, t.roughness, t.transmission) = (means.metallic, means.roughness, means.transmission);
-            let count = t.cells.count() as usize;
-            for side in 0..sides(t) {
-                let cell = |values: &[[f32; 3]], k: usize| values[if values.len() == 1 { 0 } else { k }];
-                self.base_color.extend((0..count).map(|k| cell(&means.color, k)));
-                if emits {
-                    let on = side == 0;
-                    self.emission.extend((0..count).map(|k| if on { cell(&means.emission, k) } else { [0.0; 3] }));
-                }
-                if holes {
-                    self.coverage
-                        .extend((0..count).map(|k| means.coverage[if means.coverage.len() == 1 { 0 } else { k }]));
-                }
-            }
-        }
-        if self.emission.iter().all(|e| *e == [0.0; 3]) {
-            self.emission = Vec::new();
-        }
-        self.passes = self.patches().any(|p| self.scatter(p).specular.is_some());
-    }
-
-    /// Means over a triangle's cells; `texels` are those of the largest picture.
-    fn triangle_means(&self, triangle: u32, texels: f64) -> TriangleMeans {
-        let t = &self.triangles[triangle as usize];
-        let material = &self.materials[t.material as usize];
-        let texel = base_texel(&material.surface);
-        let (mut metallic, mut roughness, mut mr_texture) = (0.0, 1.0, None);
-        if let Surface::MetallicRoughness { metallic: m, roughness: r, metallic_roughness_texture, .. } =
-            &material.surface
-        {
-            (metallic, roughness, mr_texture) = (*m, *r, metallic_roughness_texture.as_ref());
-        }
-        let usable = |t: &Option<TextureRef>| t.as_ref().is_some_and(|t| self.texcoords(triangle, t).is_some());
-        let textured = usable(&texel.texture) || usable(&material.emission_texture);
-        let mut means = TriangleMeans {
-            color: vec![texel.factor.to_f32()],
-            emission: vec![material.emission.to_f32()],
-            coverage: vec![1.0],
-            metallic: metallic as f32,
-            roughness: roughness as f32,
-            transmission: material.transmission.as_ref().map_or(0.0, |x| x.factor) as f32,
-        };
-        if let Some(texture) = mr_texture.filter(|t| self.texcoords(triangle, t).is_some()) {
-            let whole = Cells::Regular { m: 1 };
-            let n = self.samples_per_cell(triangle, &[texture], 1, texels);
-            let at = |[u, v]: [f64; 2]| self.texture_at(Some(texture), triangle, Encoding::Linear, u, v).0;
-            let mean = (0..n).map(|k| at(spread_point(&whole, 0, k))).sum::<Rgb>() / f64::from(n);
-            // glTF: roughness in green, metalness in blue.
-            (means.metallic, means.roughness) = ((metallic * mean.b) as f32, (roughness * mean.g) as f32);
-        }
-        if !textured {
-            means.coverage = vec![least_coverage(self.presence_at(triangle, 0.25, 0.25))];
-            return means;
-        }
-        let count = t.cells.count();
-        let textures: Vec<_> = texel.texture.iter().chain(&material.emission_texture).collect();
-        let n = self.samples_per_cell(triangle, &textures, count, texels);
-        let (mut colors, mut emissions, mut coverages) = (Vec::new(), Vec::new(), Vec::new());
-        for cell in 0..count {
-            let (mut color, mut emission, mut present) = (Rgb::BLACK, Rgb::BLACK, 0.0);
-            for k in 0..n {
-                let [u, v] = spread_point(&t.cells, cell, k);
-                // What is there reflects and emits: where less is there, its colour counts for less.
-                let presence = self.presence_at(triangle, u, v);
-                if presence > 0.0 {
-                    present += presence;
-                    color += self.color_at(triangle, u, v) * presence;
-                    emission += self.emission_at(triangle, Side::Front, u, v) * presence;
-                }
-            }
-            let there = if present > 0.0 { present } else { 1.0 };
-            colors.push((color / there).to_f32());
-            emissions.push((emission / there).to_f32());
-            coverages.push(least_coverage(present / f64::from(n)));
-        }
-        (means.color, means.emission, means.coverage) = (colors, emissions, coverages);
-        means
-    }
-
-    /// Sample points for a cell's mean of `textures`: about one per texel, between 4 and 64.
-    fn samples_per_cell(&self, triangle: u32, textures: &[&TextureRef], cells: u32, texels: f64) -> u32 {
-        let area = |texture: &&TextureRef| self.uv_area(triangle, texture).unwrap_or(0.0);
-        let uv_area = textures.iter().map(area).fold(0.0, f64::max);
-        ((uv_area * texels / f64::from(cells)).ceil() as u32).clamp(4, 64)
-    }
-
-    /// How much of its picture, or of how many copies of it, `texture` shows on a triangle.
-    pub(crate) fn uv_area(&self, triangle: u32, texture: &TextureRef) -> Option<f64> {
-        let t = self.texcoords(triangle, texture)?;
-        let d = |i: usize, k: usize| f64::from(t[i][k] - t[0][k]);
-        let [a, b] = texture.transform.scale;
-        Some(0.5 * (d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0)).abs() * (a * b).abs())
-    }
 }
 
-/// A ray can still meet what no sample met: the area must not be zero.
-fn least_coverage(share: f64) -> f32 {
-    if share > 0.0 { share as f32 } else { 1e-3 }
-}
-
-/// A number in [0, 1) that belongs to a point of a triangle.
-fn chance_at(triangle: u32, u: f64, v: f64) -> f64 {
-    let bits = mix(mix(u64::from(triangle).wrapping_add(PLACES) ^ mix(u.to_bits())) ^ v.to_bits());
-    to_unit(mix(bits))
-}
-
-/// Keeps the hash of points apart from those of random streams.
-const PLACES: u64 = 0x7477_696e_2061_6c70;
-
-/// The materials, where masks and blending without a transparent texel are none: rays need not ask for them.
-fn without_needless_alpha(scene: &Scene) -> Vec<Material> {
-    let mut least: Vec<Option<f64>> = vec![None; scene.images.len()];
-    let mut least_of = |texture: &TextureRef| {
-        let alphas = || scene.images[texture.image].rgba.chunks_exact(4).map(|t| t[3]);
-        *least[texture.image].get_or_insert_with(|| f64::from(alphas().min().unwrap_or(255)) / 255.0)
-    };
-    let mut materials = scene.materials.clone();
-    for material in materials.iter_mut().filter(|m| m.opacity != Opacity::Opaque) {
-        let texel = base_texel(&material.surface);
-        let alpha = texel.alpha * texel.texture.as_ref().map_or(1.0, &mut least_of);
-        let needed = if let Opacity::Mask { cutoff } = material.opacity { f64::from(cutoff) } else { 1.0 };
-        if alpha >= needed {
-            material.opacity = Opacity::Opaque;
-        }
-    }
-    materials
-}
-
-/// Point `k` of a cell's additive recurrence (Roberts's R2 sequence): even for any number of points, and on no
-/// lattice line of the cell.
-fn spread_point(cells: &Cells, cell: u32, k: u32) -> [f64; 2] {
-    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
-    let [s, t] = STEP.map(|a| (0.5 + a * f64::from(k)).fract());
-    cells.point(cell, s, t)
-}
-
-pub(crate) struct TriangleMeans {
-    color: Vec<[f32; 3]>,
-    emission: Vec<[f32; 3]>,
-    coverage: Vec<f32>,
-    metallic: f32,
-    roughness: f32,
-    transmission: f32,
-}
-
-pub(crate) fn base_texel(surface: &Surface) -> &crate::authored::Texel {
-    match surface {
-        Surface::Lambertian { reflectance } => reflectance,
-        Surface::MetallicRoughness { base_color, .. } => base_color,
-        Surface::Phong { diffuse, .. } => diffuse,
-    }
-}
-
-fn sides(t: &Triangle) -> u32 {
+pub(crate) fn sides(t: &Triangle) -> u32 {
     1 + u32::from(t.two_sided)
 }
 
-fn vec(p: [f32; 3]) -> DVec3 {
+pub(crate) fn vec(p: [f32; 3]) -> DVec3 {
     DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 

@@ -35,24 +35,35 @@ pub fn linear_to_srgb(v: f64) -> f64 {
 /// Colour and alpha where the mesh's texture coordinates are (`u`, `v`); v = 0 is the top row, texel centres at half
 /// integers.
 pub fn lookup(image: &TextureImage, texture: &TextureRef, encoding: Encoding, u: f64, v: f64) -> (Rgb, f64) {
-    let [u, v] = texture.transform.apply([u, v]);
-    let (x, y) = (u * f64::from(image.width), v * f64::from(image.height));
+    filtered([image.width, image.height], texture, [u, v], |i| decoded(image, encoding, i))
+}
+
+/// The same of a picture of `size`, width and height, whose texels `texel` gives by their index.
+pub(crate) fn filtered(
+    size: [u32; 2],
+    texture: &TextureRef,
+    place: [f64; 2],
+    texel: impl Fn(usize) -> (Rgb, f64),
+) -> (Rgb, f64) {
+    let [u, v] = texture.transform.apply(place);
+    let at = |x: f64, y: f64| {
+        let [column, row] = [wrapped(x, size[0], texture.wrap[0]), wrapped(y, size[1], texture.wrap[1])];
+        texel(row as usize * size[0] as usize + column as usize)
+    };
+    let (x, y) = (u * f64::from(size[0]), v * f64::from(size[1]));
     if texture.nearest {
-        return texel(image, texture, encoding, x.floor(), y.floor());
+        return at(x.floor(), y.floor());
     }
     let (x, y) = (x - 0.5, y - 0.5);
     let (x0, y0) = (x.floor(), y.floor());
     let (fx, fy) = (x - x0, y - y0);
-    let at = |dx: f64, dy: f64| texel(image, texture, encoding, x0 + dx, y0 + dy);
     let mix = |a: (Rgb, f64), b: (Rgb, f64), t: f64| (a.0.lerp(b.0, t), a.1 + (b.1 - a.1) * t);
-    mix(mix(at(0.0, 0.0), at(1.0, 0.0), fx), mix(at(0.0, 1.0), at(1.0, 1.0), fx), fy)
+    mix(mix(at(x0, y0), at(x0 + 1.0, y0), fx), mix(at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0), fx), fy)
 }
 
-fn texel(image: &TextureImage, texture: &TextureRef, encoding: Encoding, x: f64, y: f64) -> (Rgb, f64) {
-    let column = wrapped(x, image.width, texture.wrap[0]);
-    let row = wrapped(y, image.height, texture.wrap[1]);
-    let start = 4 * (row as usize * image.width as usize + column as usize);
-    let Some(&[r, g, b, a]) = image.rgba.get(start..start + 4) else { return (Rgb::WHITE, 1.0) };
+/// Colour and alpha of texel number `index`, rows first.
+pub(crate) fn decoded(image: &TextureImage, encoding: Encoding, index: usize) -> (Rgb, f64) {
+    let Some(&[r, g, b, a]) = image.rgba.get(4 * index..4 * index + 4) else { return (Rgb::WHITE, 1.0) };
     let decode = |byte: u8| match encoding {
         Encoding::Srgb => f64::from(srgb_table()[usize::from(byte)]),
         Encoding::Linear => f64::from(byte) / 255.0,

@@ -6,8 +6,8 @@ use crate::authored::{
     Environment, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface,
     TextureImage, TextureTransform,
 };
-use crate::patch::base_texel;
 use crate::rgb::Rgb;
+use crate::surface::base_texel;
 use crate::texture::srgb_to_linear;
 
 /// One fault: which element, what is wrong, what was expected.

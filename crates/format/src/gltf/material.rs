@@ -116,7 +116,9 @@ impl Reader<'_, '_> {
                 roughness,
                 metallic_roughness_texture,
                 specular,
+                specular_texture: None,
                 specular_color,
+                specular_color_texture: None,
                 ior,
             }
         };

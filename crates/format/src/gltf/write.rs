@@ -188,6 +188,7 @@ impl Writer {
                 specular,
                 specular_color,
                 ior,
+                ..
             } => {
                 let mut pbr = self.pbr(base_color, *metallic, *roughness);
                 if let Some(texture) = metallic_roughness_texture {

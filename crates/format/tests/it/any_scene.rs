@@ -29,6 +29,8 @@ fn surface() -> impl Strategy<Value = Surface> {
             metallic,
             roughness,
             metallic_roughness_texture: None,
+            specular_texture: None,
+            specular_color_texture: None,
             specular,
             specular_color,
             ior,

@@ -138,6 +138,8 @@ fn ggx(base_color: Rgb, metallic: f64, roughness: f64) -> Surface {
         metallic,
         roughness,
         metallic_roughness_texture: None,
+        specular_texture: None,
+        specular_color_texture: None,
         specular: 1.0,
         specular_color: Rgb::WHITE,
         ior: 1.5,

@@ -3,7 +3,7 @@
 use glam::DAffine3;
 
 use super::*;
-use crate::authored::{Instance, Mesh, Texel, TextureTransform, Wrap};
+use crate::authored::{Instance, Mesh, Texel, TextureRef, TextureTransform, Wrap};
 use crate::builtin;
 
 fn square(transform: DAffine3, two_sided: bool) -> Scene {

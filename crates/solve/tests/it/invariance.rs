@@ -154,6 +154,8 @@ fn lamp_and_sensor_may_be_swapped() {
         metallic,
         roughness,
         metallic_roughness_texture: None,
+        specular_texture: None,
+        specular_color_texture: None,
         specular: 1.0,
         specular_color: Rgb::WHITE,
         ior: 1.5,

@@ -49,6 +49,8 @@ fn glossy_cornell() -> Scene {
             metallic: 0.0,
             roughness: 0.35,
             metallic_roughness_texture: None,
+            specular_texture: None,
+            specular_color_texture: None,
             specular: 1.0,
             specular_color: Rgb::WHITE,
             ior: 1.8,

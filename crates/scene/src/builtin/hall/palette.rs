@@ -75,6 +75,8 @@ fn stone_floor(builder: &mut Builder, name: &str, colour: Rgb, glossy: bool) -> 
             metallic: 0.0,
             roughness: 0.38,
             metallic_roughness_texture: None,
+            specular_texture: None,
+            specular_color_texture: None,
             specular: 1.0,
             specular_color: Rgb::WHITE,
             ior: 1.5,
