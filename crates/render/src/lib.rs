@@ -8,7 +8,6 @@ pub mod compare;
 mod direct;
 pub mod display;
 mod element;
-mod film;
 mod gather;
 mod grid;
 pub mod image;
@@ -16,6 +15,7 @@ mod lights;
 pub mod picture;
 mod reconstruct;
 pub mod reference;
+mod sums;
 mod vertex;
 
 pub use display::{Exposure, ToneCurve};

@@ -6,8 +6,8 @@
 use super::sample::Estimator;
 use super::tile::{PIXELS, SIDE, Tile};
 use crate::direct::Shadows;
-use crate::film::{PixelSums, Seen};
 use crate::lights::{Choice, Lights};
+use crate::sums::{PixelSums, Seen};
 
 /// Tiles along a side of a block.
 pub(super) const TILES: usize = 4;

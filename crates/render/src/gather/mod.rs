@@ -16,8 +16,8 @@ mod tile;
 use twinray_scene::{Camera, PatchScene};
 use twinray_solve::Solution;
 
-use crate::film::{self, PixelSums};
 use crate::picture::Picture;
+use crate::sums::{self, PixelSums};
 use block::{Block, EDGE};
 use sample::Estimator;
 use tile::SIDE;
@@ -76,7 +76,7 @@ impl<'a> Gather<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        film::picture(&self.pixels(), self.options.width)
+        sums::picture(&self.pixels(), self.options.width)
     }
 
     /// The part of the picture that surfaces reflect of light straight from what emits, in every pixel, linear radiance.
@@ -93,7 +93,7 @@ impl<'a> Gather<'a> {
     /// Relative RMS error of the pixels' luminance by their noise, √(Σ variance / Σ 𝓛²), over pixels that no light
     /// covers; over all pixels if there are no others. Infinite before the second batch; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
-        film::relative_error(&self.pixels())
+        sums::relative_error(&self.pixels())
     }
 
     /// Camera rays that were dropped because their radiance was not finite; 0 unless something is wrong.

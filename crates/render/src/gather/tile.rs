@@ -13,7 +13,7 @@ use twinray_scene::sample::{PixelSample, net_point};
 
 use super::sample::{Estimator, Gathered, Point, Sight};
 use crate::direct::Shadows;
-use crate::film::Seen;
+use crate::sums::Seen;
 
 /// Pixels along a side of a tile.
 pub(super) const SIDE: usize = 4;

@@ -9,8 +9,8 @@ use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchScene, Rgb};
 
 use super::path::{PathTracer, Technique};
-use crate::film::{self, PixelSums, Seen};
 use crate::picture::{Picture, first_side, tent};
+use crate::sums::{self, PixelSums, Seen};
 use crate::vertex::{Look, Vertex};
 
 /// Settings of [`super::picture`].
@@ -81,7 +81,7 @@ impl<'a> PixelTracer<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        film::picture(&self.pixels, self.options.width)
+        sums::picture(&self.pixels, self.options.width)
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
@@ -93,7 +93,7 @@ impl<'a> PixelTracer<'a> {
     /// Relative RMS error of the pixels' luminance, √(Σ variance / Σ 𝓛²), over pixels that no light covers; over all
     /// pixels if there are no others. Infinite before the second path; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
-        film::relative_error(&self.pixels)
+        sums::relative_error(&self.pixels)
     }
 
     /// Paths that were dropped because their radiance was not finite; 0 unless something is wrong.
