@@ -8,6 +8,7 @@ pub mod compare;
 mod direct;
 pub mod display;
 mod element;
+mod film;
 mod gather;
 mod grid;
 pub mod image;
@@ -19,6 +20,7 @@ mod sums;
 mod vertex;
 
 pub use display::{Exposure, ToneCurve};
+pub use film::Crop;
 pub use gather::{Gather, GatherOptions};
 pub use image::Image;
 pub use picture::{Lobes, Picture, PictureOptions, render};

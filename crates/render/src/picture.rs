@@ -14,6 +14,7 @@ use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
 use crate::direct::{Part, Shadows, direct, power_heuristic};
+use crate::film::{Crop, Film};
 use crate::image::Image;
 use crate::lights::Lights;
 use crate::reconstruct::Reconstruction;
@@ -22,10 +23,12 @@ use crate::vertex::{Look, Step, Vertex};
 /// Settings of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct PictureOptions {
-    /// Pixels in a row.
+    /// Pixels in a row of the whole film.
     pub width: u32,
-    /// Rows.
+    /// Rows of the whole film.
     pub height: u32,
+    /// The part of the film that is wanted, within it; `None` for all of it.
+    pub crop: Option<Crop>,
     /// Camera rays per pixel.
     pub samples: u32,
     /// Show the raw patches instead of smooth light.
@@ -47,7 +50,7 @@ pub enum Lobes {
 
 impl Default for PictureOptions {
     fn default() -> Self {
-        Self { width: 640, height: 480, samples: 16, flat: false, lobes: Lobes::Traced }
+        Self { width: 640, height: 480, crop: None, samples: 16, flat: false, lobes: Lobes::Traced }
     }
 }
 
@@ -77,30 +80,27 @@ const MOST_PASSED: u32 = 32;
 const MOST_BACKS: u32 = 16;
 
 /// Takes a picture of `solution`. The glossy part is that of the observer which the solver was given.
+///
+/// # Panics
+/// If the crop is not within the film.
 pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options: &PictureOptions) -> Picture {
     let reconstruction = Reconstruction::new(scene, solution);
     let traced = !options.flat && options.lobes == Lobes::Traced && solution.splits_direct_light();
     let lamps = (traced && !solution.is_observed()).then(|| Lights::new(scene));
     let view = View { scene, reconstruction, flat: options.flat, traced, lamps };
-    let aspect = f64::from(options.width) / f64::from(options.height);
-    let rows: Vec<(Vec<Pixel>, Light)> = (0..options.height)
+    let film = Film::new(options.width, options.height, options.crop);
+    let window = film.window;
+    let rows: Vec<(Vec<Pixel>, Light)> = (window.y..window.y + window.height)
         .into_par_iter()
         .map(|y| {
             let mut light = Light::default();
-            let row = (0..options.width)
+            let row = (window.x..window.x + window.width)
                 .map(|x| {
                     let (mut sum, mut lights, mut covered) = (Rgb::BLACK, Rgb::BLACK, 0.0);
                     for k in 0..options.samples {
-                        let [dx, dy] = film_offset(options, x, y, k);
-                        let (px, py) = (f64::from(x) + dx, f64::from(y) + dy);
-                        let (origin, direction) =
-                            camera.ray(px / f64::from(options.width), py / f64::from(options.height), aspect);
-                        let (reflected, direct) = view.seen(
-                            origin - scene.centre(),
-                            direction,
-                            LobeNumbers::new(options, x, y, k),
-                            &mut light,
-                        );
+                        let Some((origin, direction)) = film.sample(camera, [x, y], k) else { continue };
+                        let u = LobeNumbers::new(film.number([x, y]), options.samples, k);
+                        let (reflected, direct) = view.seen(origin - scene.centre(), direction, u, &mut light);
                         sum += reflected + direct;
                         lights += direct;
                         covered += if direct.is_black() { 0.0 } else { 1.0 };
@@ -113,8 +113,7 @@ pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options:
         })
         .collect();
     let mut total = Light::default();
-    let count = options.width as usize * options.height as usize;
-    let (mut pixels, mut lights) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let (mut pixels, mut lights) = (Vec::with_capacity(film.len()), Vec::with_capacity(film.len()));
     for (row, light) in rows {
         for (pixel, direct) in row {
             pixels.push(pixel);
@@ -123,26 +122,11 @@ pub fn render(scene: &PatchScene, solution: &Solution, camera: &Camera, options:
         total.add(&light);
     }
     Picture {
-        image: Image { width: options.width, height: options.height, pixels },
+        image: Image { width: window.width, height: window.height, pixels },
         lights,
         log2_luminance: (total.lit > 0).then(|| total.log2_sum / total.lit as f64),
         empty: total.empty as f64 / total.rays.max(1) as f64,
     }
-}
-
-/// Place of a sample within and around its pixel: stratified, spread by a tent of one pixel's radius.
-fn film_offset(options: &PictureOptions, x: u32, y: u32, k: u32) -> [f64; 2] {
-    let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
-    let mut jitter = Stream::new(0, 0xF11A, pixel);
-    // An additive recurrence (R2), shifted at random per pixel, is even for any number of samples.
-    let place = |step: f64, shift: f64| (f64::from(k) * step + shift).fract();
-    let u = [place(0.754_877_666_246_692_7, jitter.uniform()), place(0.569_840_290_998_053_3, jitter.uniform())];
-    u.map(tent)
-}
-
-/// Place across a pixel, whose middle is 0.5, from a number in [0, 1): spread by a tent of one pixel's radius.
-pub(crate) fn tent(u: f64) -> f64 {
-    0.5 + if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
 }
 
 /// Radiance, and of it the lights' part with their coverage.
@@ -173,13 +157,13 @@ struct LobeNumbers {
 }
 
 impl LobeNumbers {
-    fn new(options: &PictureOptions, x: u32, y: u32, k: u32) -> Self {
-        let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
+    /// Of sample `k` of `samples` of a pixel, by its number on the whole film.
+    fn new(pixel: u64, samples: u32, k: u32) -> Self {
         let mut shift = Stream::new(0, 0x10BE, pixel);
-        let n = f64::from(options.samples);
+        let n = f64::from(samples);
         let stratum = (f64::from(k) + 0.5) / n + shift.uniform();
         let place = [stratum.fract(), (f64::from(k) * 0.618_033_988_749_894_9 + shift.uniform()).fract()];
-        Self { place, index: pixel * u64::from(options.samples) + u64::from(k) }
+        Self { place, index: pixel * u64::from(samples) + u64::from(k) }
     }
 }
 

@@ -29,7 +29,7 @@ pub use authored::{
     Transmission, Volume, Wrap,
 };
 pub use bvh::SurfaceHit;
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Lens, Projection};
 pub use estimate::{Estimate, estimate};
 pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
 pub use punctual::PointLight;

@@ -53,7 +53,7 @@ pub(super) fn run(
     let goal = until.unwrap_or(Goal::Rays(u64::from(most) * pixels));
     let mut progress = Progress::new(goal, args.load.quiet).counting("paths");
     let seed = args.solve.seed.unwrap_or(1);
-    let options = PathPictureOptions { width, height, samples: most, seed, technique: Technique::Both };
+    let options = PathPictureOptions { width, height, crop: None, samples: most, seed, technique: Technique::Both };
     let mut tracer = PixelTracer::new(&loaded.patches, camera, &options);
     loop {
         tracer.advance(1);

@@ -65,7 +65,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         None | Some(LobesArg::Traced) => Lobes::Traced,
         Some(LobesArg::Patches) => Lobes::Patches,
     };
-    let options = PictureOptions { width, height, samples, flat: args.flat, lobes };
+    let options = PictureOptions { width, height, crop: None, samples, flat: args.flat, lobes };
     if !solution.is_observed() && (args.flat || matches!(lobes, Lobes::Patches)) {
         let matte = format!(
             "{}: glossy surfaces look matte with --flat and --lobes patches, since a file knows no camera: render the scene itself",

@@ -194,5 +194,5 @@ fn try_camera(root: &Element<'_>, placed: &Placed<'_>) -> Result<Option<Camera>,
         return Err(placed.node.fault("a scale of 0", "a transform that keeps directions"));
     };
     let name = placed.node.name_or(|| camera.name_or(|| format!("camera {index}")));
-    Ok(Some(Camera { name, eye: placed.to_world.translation, forward, up, projection, aspect }))
+    Ok(Some(Camera { name, eye: placed.to_world.translation, forward, up, projection, lens: None, aspect }))
 }

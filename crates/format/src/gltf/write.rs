@@ -292,9 +292,14 @@ fn set_transform(node: &mut Value, transform: &DAffine3) {
     }
 }
 
+/// glTF knows neither panoramas nor fisheyes nor lenses: the first two become a wide view of what they look at.
 fn camera(camera: &Camera) -> Value {
+    const WIDE: f64 = std::f64::consts::FRAC_PI_2;
     // Clipping planes mean nothing to light; others want them.
     match camera.projection {
+        Projection::Panorama | Projection::Fisheye { .. } => {
+            json!({ "name": camera.name, "type": "perspective", "perspective": { "yfov": WIDE, "znear": 0.01 } })
+        }
         Projection::Perspective { vertical_fov } => {
             let mut perspective = json!({ "yfov": vertical_fov, "znear": 0.01 });
             if let Some(aspect) = camera.aspect {

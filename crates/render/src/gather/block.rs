@@ -3,9 +3,13 @@
 //! Which lamps light a place, and how much of them gets there, is learnt from the shadow rays themselves, pass by pass.
 //! A block learns alone and in order, so that threads change nothing.
 
+use glam::DVec3;
+use twinray_scene::sample::PixelSample;
+
 use super::sample::Estimator;
 use super::tile::{PIXELS, SIDE, Tile};
 use crate::direct::Shadows;
+use crate::film::Crop;
 use crate::lights::{Choice, Lights};
 use crate::sums::{PixelSums, Seen};
 
@@ -25,8 +29,10 @@ pub(super) struct Block {
     /// First pixel.
     pub x: usize,
     pub y: usize,
-    /// Pixels of the film.
-    film: (usize, usize),
+    /// The pixels that are wanted.
+    window: Crop,
+    /// Pixels in a row of the whole film.
+    width: usize,
     /// Sums, `EDGE` to a row.
     pub sums: Vec<PixelSums>,
     /// Σ of the light that each lamp gave, and the number of shadow rays.
@@ -36,8 +42,16 @@ pub(super) struct Block {
 
 impl Block {
     /// The block whose first pixel is (`x`, `y`).
-    pub fn new(x: usize, y: usize, film: (usize, usize), lights: &Lights) -> Self {
-        Self { x, y, film, sums: vec![PixelSums::default(); EDGE * EDGE], given: vec![0.0; lights.len()], lessons: 0 }
+    pub fn new((x, y): (usize, usize), window: Crop, width: usize, lights: &Lights) -> Self {
+        Self {
+            x,
+            y,
+            window,
+            width,
+            sums: vec![PixelSums::default(); EDGE * EDGE],
+            given: vec![0.0; lights.len()],
+            lessons: 0,
+        }
     }
 
     /// Sums of a pixel of the film that lies in the block.
@@ -51,30 +65,29 @@ impl Block {
         estimator: &Estimator,
         seed: u64,
         batches: impl Fn(usize, usize) -> u32,
-        ray: impl Fn(usize, usize, &mut twinray_scene::sample::PixelSample) -> (glam::DVec3, glam::DVec3),
+        ray: impl Fn(usize, usize, &mut PixelSample) -> Option<(DVec3, DVec3)>,
     ) {
         let learnt = self.learnt(&estimator.lights);
         let shadows = match &learnt {
             Some(choice) => Shadows { choice, candidates: 1 },
             None => estimator.shadows(),
         };
-        let (width, height) = self.film;
+        let (width, window) = (self.width, self.window);
         let tiles_in_row = width.div_ceil(SIDE) as u64;
+        let within = |at: usize, first: u32, count: u32| at >= first as usize && at < first as usize + count as usize;
         for t in 0..TILES * TILES {
             let (x0, y0) = (self.x + t % TILES * SIDE, self.y + t / TILES * SIDE);
-            if x0 >= width || y0 >= height {
-                continue;
-            }
             let places: Vec<(usize, usize)> = (0..PIXELS)
                 .map(|slot| (x0 + slot % SIDE, y0 + slot / SIDE))
-                .filter(|&(x, y)| x < width && y < height)
+                .filter(|&(x, y)| within(x, window.x, window.width) && within(y, window.y, window.height))
                 .collect();
+            let Some(&(first_x, first_y)) = places.first() else { continue };
             let pixels: Vec<(u64, usize)> =
                 places.iter().map(|&(x, y)| ((y * width + x) as u64, (y - y0) * SIDE + x - x0)).collect();
             let number = (y0 / SIDE) as u64 * tiles_in_row + (x0 / SIDE) as u64;
             let tile = Tile { number, pixels: &pixels, seed };
             for _ in 0..batches(x0 / SIDE, y0 / SIDE) {
-                let first = self.pixel(x0, y0).rays();
+                let first = self.pixel(first_x, first_y).rays();
                 let mut seen = [Seen::default(); PIXELS];
                 for k in first..first.saturating_add(BATCH) {
                     let (given, lessons) = (&mut self.given, &mut self.lessons);

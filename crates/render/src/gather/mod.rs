@@ -16,6 +16,7 @@ mod tile;
 use twinray_scene::{Camera, PatchScene};
 use twinray_solve::Solution;
 
+use crate::film::{Crop, Film};
 use crate::picture::Picture;
 use crate::sums::{self, PixelSums};
 use block::{Block, EDGE};
@@ -29,6 +30,9 @@ pub struct GatherOptions {
     pub width: u32,
     /// Rows.
     pub height: u32,
+    /// The part of the film that is wanted; all of it without. A part alone is as good as it is in the whole picture, but
+    /// not to the bit: neighbours share their rays, and noise decides where rays go.
+    pub crop: Option<Crop>,
     /// Seed of every random number.
     pub seed: u64,
     /// Whether pixels with more noise get more camera rays.
@@ -37,7 +41,7 @@ pub struct GatherOptions {
 
 impl Default for GatherOptions {
     fn default() -> Self {
-        Self { width: 640, height: 480, seed: 1, adaptive: true }
+        Self { width: 640, height: 480, crop: None, seed: 1, adaptive: true }
     }
 }
 
@@ -45,8 +49,10 @@ impl Default for GatherOptions {
 pub struct Gather<'a> {
     estimator: Estimator<'a>,
     camera: Camera,
-    options: GatherOptions,
-    /// Row by row.
+    film: Film,
+    seed: u64,
+    adaptive: bool,
+    /// Row by row, on the blocks' grid over the whole film.
     blocks: Vec<Block>,
     /// Camera rays so far.
     rays: u64,
@@ -55,13 +61,18 @@ pub struct Gather<'a> {
 impl<'a> Gather<'a> {
     /// A black picture of `solution`.
     pub fn new(scene: &'a PatchScene, solution: &'a Solution, camera: &Camera, options: &GatherOptions) -> Self {
-        let film = (options.width as usize, options.height as usize);
+        let film = Film::new(options.width, options.height, options.crop);
         let estimator = Estimator::new(scene, solution);
-        let blocks = (0..film.1.div_ceil(EDGE))
-            .flat_map(|y| (0..film.0.div_ceil(EDGE)).map(move |x| (x * EDGE, y * EDGE)))
-            .map(|(x, y)| Block::new(x, y, film, &estimator.lights))
+        let grid = Grid::new(&film.window, EDGE);
+        let blocks = (0..grid.rows)
+            .flat_map(|row| (0..grid.columns).map(move |column| (column, row)))
+            .map(|(column, row)| {
+                let first = ((grid.column + column) * EDGE, (grid.row + row) * EDGE);
+                Block::new(first, film.window, options.width as usize, &estimator.lights)
+            })
             .collect();
-        Self { estimator, camera: camera.clone(), options: *options, blocks, rays: 0 }
+        let (seed, adaptive) = (options.seed, options.adaptive);
+        Self { estimator, camera: camera.clone(), film, seed, adaptive, blocks, rays: 0 }
     }
 
     /// Camera rays per pixel so far, mean.
@@ -76,7 +87,7 @@ impl<'a> Gather<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        sums::picture(&self.pixels(), self.options.width)
+        sums::picture(&self.pixels(), self.film.window.width)
     }
 
     /// The part of the picture that surfaces reflect of light straight from what emits, in every pixel, linear radiance.
@@ -102,22 +113,49 @@ impl<'a> Gather<'a> {
     }
 
     fn pixel_count(&self) -> usize {
-        self.options.width as usize * self.options.height as usize
+        self.film.len()
     }
 
-    /// Columns and rows of tiles.
-    fn tiles(&self) -> (usize, usize) {
-        ((self.options.width as usize).div_ceil(SIDE), (self.options.height as usize).div_ceil(SIDE))
+    /// Tiles of the window.
+    fn tiles(&self) -> Grid {
+        Grid::new(&self.film.window, SIDE)
     }
 
-    /// The block that holds a pixel.
-    fn block(&self, x: usize, y: usize) -> &Block {
-        &self.blocks[y / EDGE * (self.options.width as usize).div_ceil(EDGE) + x / EDGE]
+    /// Sums of a pixel of the whole film that is in the window.
+    fn pixel(&self, x: usize, y: usize) -> &PixelSums {
+        let grid = Grid::new(&self.film.window, EDGE);
+        self.blocks[grid.index(x / EDGE, y / EDGE)].pixel(x, y)
     }
 
     /// Sums of all pixels, row by row.
     fn pixels(&self) -> Vec<PixelSums> {
-        let (width, height) = (self.options.width as usize, self.options.height as usize);
-        (0..height).flat_map(|y| (0..width).map(move |x| *self.block(x, y).pixel(x, y))).collect()
+        let places = (0..self.film.len()).map(|index| self.film.place(index));
+        places.map(|[x, y]| *self.pixel(x as usize, y as usize)).collect()
+    }
+}
+
+/// Squares of the whole film that have a part in a window.
+#[derive(Clone, Copy, Debug)]
+struct Grid {
+    /// First column and row, in squares of the whole film.
+    column: usize,
+    row: usize,
+    columns: usize,
+    rows: usize,
+}
+
+impl Grid {
+    fn new(window: &Crop, edge: usize) -> Self {
+        let range = |first: u32, count: u32| {
+            let (first, end) = (first as usize, first as usize + count as usize);
+            (first / edge, end.div_ceil(edge) - first / edge)
+        };
+        let ((column, columns), (row, rows)) = (range(window.x, window.width), range(window.y, window.height));
+        Self { column, row, columns, rows }
+    }
+
+    /// Number in the window of a square of the whole film, row by row.
+    fn index(&self, column: usize, row: usize) -> usize {
+        (row - self.row) * self.columns + column - self.column
     }
 }

@@ -7,10 +7,10 @@
 use rayon::prelude::*;
 use twinray_scene::sample::PixelSample;
 
-use super::Gather;
 use super::block::{BATCH, Block};
 use super::tile::SIDE;
-use crate::picture::tent;
+use super::{Gather, Grid};
+use crate::film::tent;
 
 /// Batches of every tile before noise decides.
 const FIRST: u64 = 2;
@@ -39,16 +39,16 @@ impl Gather<'_> {
         let per_pixel = |rays: u64| rays as f64 / pixels / f64::from(BATCH);
         let wished = (samples / f64::from(BATCH)).max(1.0);
         let done = per_pixel(self.rays);
-        if done < FIRST as f64 || !self.options.adaptive {
+        if done < FIRST as f64 || !self.adaptive {
             // Whole passes over all tiles.
-            let even = if self.options.adaptive { wished.min(FIRST as f64) } else { wished };
+            let even = if self.adaptive { wished.min(FIRST as f64) } else { wished };
             // One at a time: blocks learn from each.
             for _ in 0..(even - done).ceil().max(0.0) as u64 {
                 self.pass(&|_| 1);
             }
         }
         let done = per_pixel(self.rays);
-        if self.options.adaptive && done < wished {
+        if self.adaptive && done < wished {
             let plan = self.plan((wished - done) * pixels);
             self.pass(&|tile| plan[tile]);
         }
@@ -56,9 +56,8 @@ impl Gather<'_> {
 
     /// Batches for every tile, about `budget` batches of pixels in all.
     fn plan(&self, budget: f64) -> Vec<u32> {
-        let (columns, rows) = self.tiles();
-        let known: Vec<Known> =
-            (0..columns * rows).into_par_iter().map(|t| self.known(t % columns, t / columns)).collect();
+        let Grid { columns, rows, .. } = self.tiles();
+        let known: Vec<Known> = (0..columns * rows).into_par_iter().map(|t| self.known(t)).collect();
         let total_pixels: f64 = known.iter().map(|k| k.pixels).sum();
         let mean = known.iter().map(|k| k.pixels * k.luminance).sum::<f64>() / total_pixels.max(1.0);
         let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
@@ -97,12 +96,16 @@ impl Gather<'_> {
     }
 
     /// What is known of a tile.
-    fn known(&self, column: usize, row: usize) -> Known {
-        let (width, height) = (self.options.width as usize, self.options.height as usize);
+    fn known(&self, tile: usize) -> Known {
+        let (grid, window) = (self.tiles(), &self.film.window);
+        let pixels = |square: usize, first: u32, count: u32| {
+            let (first, end) = (first as usize, (first + count) as usize);
+            (square * SIDE).max(first)..((square + 1) * SIDE).min(end)
+        };
         let mut known = Known::default();
-        for y in row * SIDE..((row + 1) * SIDE).min(height) {
-            for x in column * SIDE..((column + 1) * SIDE).min(width) {
-                let p = self.block(x, y).pixel(x, y);
+        for y in pixels(grid.row + tile / grid.columns, window.y, window.height) {
+            for x in pixels(grid.column + tile % grid.columns, window.x, window.width) {
+                let p = self.pixel(x, y);
                 known.pixels += 1.0;
                 known.luminance += p.radiance().luminance();
                 known.variance += p.variance_of_batch();
@@ -116,15 +119,14 @@ impl Gather<'_> {
 
     /// Shoots so many batches for every tile.
     fn pass(&mut self, batches: &(dyn Fn(usize) -> u32 + Sync)) {
-        let (columns, _) = self.tiles();
-        let Self { estimator, camera, options, blocks, .. } = self;
-        let (width, height) = (f64::from(options.width), f64::from(options.height));
+        let grid = self.tiles();
+        let Self { estimator, camera, film, seed, blocks, .. } = self;
         blocks.par_iter_mut().for_each(|block: &mut Block| {
             let ray = |x: usize, y: usize, numbers: &mut PixelSample| {
-                let [dx, dy] = numbers.pair().map(tent);
-                camera.ray((x as f64 + dx) / width, (y as f64 + dy) / height, width / height)
+                let (place, lens) = (numbers.pair().map(tent), numbers.pair());
+                film.ray(camera, [x as u32, y as u32], place, lens)
             };
-            block.shoot(estimator, options.seed, |column, row| batches(row * columns + column), ray);
+            block.shoot(estimator, *seed, |column, row| batches(grid.index(column, row)), ray);
         });
         self.rays = self.pixels().iter().map(|p| u64::from(p.rays())).sum();
     }

@@ -52,14 +52,15 @@ impl Tile<'_> {
         estimator: &Estimator,
         k: u32,
         shadows: Shadows,
-        ray: impl Fn(usize, &mut PixelSample) -> (DVec3, DVec3),
+        ray: impl Fn(usize, &mut PixelSample) -> Option<(DVec3, DVec3)>,
         seen: &mut [Seen],
         mut learn: impl FnMut(usize, f64),
     ) {
         let mut work = [Work::default(); PIXELS];
         for (n, &(pixel, slot)) in self.pixels.iter().enumerate() {
             let mut numbers = PixelSample::new(self.seed, pixel, k);
-            let (origin, direction) = ray(n, &mut numbers);
+            // Where the camera sees nothing, as beyond a fisheye's circle, the pixel stays black.
+            let Some((origin, direction)) = ray(n, &mut numbers) else { continue };
             let work = &mut work[n];
             work.sight = estimator.look(origin, direction, &mut numbers);
             let Some(point) = &work.sight.point else { continue };

@@ -9,17 +9,20 @@ use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchScene, Rgb};
 
 use super::path::{PathTracer, Technique};
-use crate::picture::{Picture, first_side, tent};
+use crate::film::{Crop, Film, tent};
+use crate::picture::{Picture, first_side};
 use crate::sums::{self, PixelSums, Seen};
 use crate::vertex::{Look, Vertex};
 
 /// Settings of [`super::picture`].
 #[derive(Clone, Copy, Debug)]
 pub struct PathPictureOptions {
-    /// Pixels in a row.
+    /// Pixels in a row of the whole film.
     pub width: u32,
-    /// Rows.
+    /// Rows of the whole film.
     pub height: u32,
+    /// The part of the film that is wanted, within it; `None` for all of it.
+    pub crop: Option<Crop>,
     /// Paths per pixel.
     pub samples: u32,
     /// Seed of every random number.
@@ -30,7 +33,7 @@ pub struct PathPictureOptions {
 
 impl Default for PathPictureOptions {
     fn default() -> Self {
-        Self { width: 640, height: 480, samples: 64, seed: 1, technique: Technique::default() }
+        Self { width: 640, height: 480, crop: None, samples: 64, seed: 1, technique: Technique::default() }
     }
 }
 
@@ -41,21 +44,26 @@ const PIXELS: u64 = 0x9A7B_0001;
 pub struct PixelTracer<'a> {
     tracer: PathTracer<'a>,
     camera: Camera,
-    options: PathPictureOptions,
+    film: Film,
+    seed: u64,
     pixels: Vec<PixelSums>,
     samples: u32,
 }
 
 impl<'a> PixelTracer<'a> {
     /// A black picture; `options.samples` is left to [`PixelTracer::advance`].
+    ///
+    /// # Panics
+    /// If the crop is not within the film.
     pub fn new(scene: &'a PatchScene, camera: &Camera, options: &PathPictureOptions) -> Self {
-        let count = options.width as usize * options.height as usize;
+        let film = Film::new(options.width, options.height, options.crop);
         let tracer = PathTracer::new(scene, options.technique);
         Self {
             tracer,
             camera: camera.clone(),
-            options: *options,
-            pixels: vec![PixelSums::default(); count],
+            film,
+            seed: options.seed,
+            pixels: vec![PixelSums::default(); film.len()],
             samples: 0,
         }
     }
@@ -67,13 +75,18 @@ impl<'a> PixelTracer<'a> {
 
     /// Adds `samples` paths to every pixel; how many at a time changes no bit of the sums.
     pub fn advance(&mut self, samples: u32) {
-        let Self { tracer, camera, options, pixels, .. } = self;
+        let Self { tracer, camera, film, seed, pixels, .. } = self;
         let (first, end) = (self.samples, self.samples.saturating_add(samples));
         pixels.par_iter_mut().enumerate().for_each(|(index, sums)| {
+            let at = film.place(index);
             for k in first..end {
-                let mut random = Stream::new(options.seed, PIXELS, (index as u64) << 32 | u64::from(k));
-                let ray = film_ray(camera, options, index, &mut random);
-                sums.add(&path(tracer, ray.0, ray.1, &mut random));
+                let mut random = Stream::new(*seed, PIXELS, film.number(at) << 32 | u64::from(k));
+                let [dx, dy] = [tent(random.uniform()), tent(random.uniform())];
+                let lens = if camera.lens.is_some() { [random.uniform(), random.uniform()] } else { [0.0; 2] };
+                sums.add(&match film.ray(camera, at, [dx, dy], lens) {
+                    Some((origin, direction)) => path(tracer, origin, direction, &mut random),
+                    None => Seen { rays: 1, ..Seen::default() },
+                });
             }
         });
         self.samples = end;
@@ -81,7 +94,7 @@ impl<'a> PixelTracer<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        sums::picture(&self.pixels, self.options.width)
+        sums::picture(&self.pixels, self.film.window.width)
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
@@ -122,12 +135,4 @@ fn path(tracer: &PathTracer, origin: DVec3, direction: DVec3, random: &mut Strea
         (seen.unlit, seen.unlit_luminance) = (1, found.reflected.luminance());
     }
     Seen { radiance: lights + found.reflected, lights, covered: u32::from(!lights.is_black()), ..seen }
-}
-
-/// Camera ray through an independent point of a pixel's filter.
-fn film_ray(camera: &Camera, options: &PathPictureOptions, index: usize, random: &mut Stream) -> (DVec3, DVec3) {
-    let (width, height) = (f64::from(options.width), f64::from(options.height));
-    let (x, y) = (index % options.width as usize, index / options.width as usize);
-    let [dx, dy] = [tent(random.uniform()), tent(random.uniform())];
-    camera.ray((x as f64 + dx) / width, (y as f64 + dy) / height, width / height)
 }

@@ -170,6 +170,7 @@ fn glossy_plates_reflect_their_albedo() {
                 forward: -back,
                 up: DVec3::Z,
                 projection: Projection::Orthographic { half_height: 0.1 },
+                lens: None,
                 aspect: None,
             };
             for technique in TECHNIQUES {
