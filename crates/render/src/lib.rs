@@ -19,7 +19,7 @@ pub mod reference;
 mod sums;
 mod vertex;
 
-pub use display::{Exposure, ToneCurve};
+pub use display::{Exposure, PhysicalCamera, ToneCurve, WhiteBalance};
 pub use film::Crop;
 pub use gather::{Gather, GatherOptions};
 pub use image::Image;
