@@ -7,9 +7,10 @@ use std::io::Cursor;
 use exr::meta::attribute::Chromaticities;
 use exr::meta::header::standard_names;
 use exr::prelude::{
-    AttributeValue, Encoding, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, SpecificChannels, Text,
-    Vec2, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, Text, Vec2, WritableImage,
 };
+use twinray_render::Aovs;
 
 /// The bytes of an OpenEXR file with the 32-bit channels R, G and B, compressed without loss (ZIP).
 ///
@@ -28,15 +29,32 @@ pub fn write_exr(
     white_luminance: Option<f32>,
     attributes: &[(&str, &str)],
 ) -> Vec<u8> {
+    write_exr_aovs(width, height, pixels, &Aovs::default(), white_luminance, attributes)
+}
+
+/// As [`write_exr`], with a layer of channels beside R, G and B for each output variable that is there: `albedo.R`, `.G`,
+/// `.B`, `normal.X`, `.Y`, `.Z`, `depth.Z`, `direct.R`…, `indirect.R`…, `patch.id` (unsigned integers) and `error.Y`. All lie in
+/// one part, which every reader knows, and are named as the "Technical Introduction to OpenEXR" names layers: Blender shows
+/// them as passes, Nuke as layers.
+///
+/// # Panics
+/// As [`write_exr`], and if a variable has not as many elements as `pixels`.
+pub fn write_exr_aovs(
+    width: u32,
+    height: u32,
+    pixels: &[[f32; 3]],
+    aovs: &Aovs,
+    white_luminance: Option<f32>,
+    attributes: &[(&str, &str)],
+) -> Vec<u8> {
     let expected = u64::from(width) * u64::from(height);
     assert_eq!(pixels.len() as u64, expected, "write_exr: {width}×{height} pixels were announced");
     assert!(expected > 0, "write_exr: a picture without pixels");
     let size = Vec2(width as usize, height as usize);
-    let read = |at: Vec2<usize>| {
-        let [r, g, b] = pixels[at.1 * size.0 + at.0];
-        (r, g, b)
-    };
-    let channels = SpecificChannels::rgb(read);
+    let channels = channels(pixels, aovs);
+    let fits = |c: &AnyChannel<FlatSamples>| c.sample_data.len() == pixels.len();
+    assert!(channels.iter().all(fits), "write_exr: an output variable has not {width}×{height} pixels");
+    let channels = AnyChannels::sort(channels.into_iter().collect());
     let mut layer = Layer::new(size, LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
 
     let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(size));
@@ -64,6 +82,29 @@ pub fn write_exr(
     let mut out = out.into_inner();
     sort_header(&mut out);
     out
+}
+
+/// All channels, by their names.
+fn channels(pixels: &[[f32; 3]], aovs: &Aovs) -> Vec<AnyChannel<FlatSamples>> {
+    let float = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+    let mut all = Vec::new();
+    let mut triple = |names: [&str; 3], values: &[[f32; 3]]| {
+        all.extend((0..3).map(|c| float(names[c], values.iter().map(|v| v[c]).collect())));
+    };
+    triple(["R", "G", "B"], pixels);
+    let triples = [
+        (["albedo.R", "albedo.G", "albedo.B"], &aovs.albedo),
+        (["normal.X", "normal.Y", "normal.Z"], &aovs.normal),
+        (["direct.R", "direct.G", "direct.B"], &aovs.direct),
+        (["indirect.R", "indirect.G", "indirect.B"], &aovs.indirect),
+    ];
+    for (names, values) in triples {
+        values.iter().for_each(|values| triple(names, values));
+    }
+    all.extend(aovs.depth.iter().map(|values| float("depth.Z", values.clone())));
+    all.extend(aovs.error.iter().map(|values| float("error.Y", values.clone())));
+    all.extend(aovs.patch.iter().map(|values| AnyChannel::new("patch.id", FlatSamples::U32(values.clone()))));
+    all
 }
 
 /// `name` as an attribute name that no reader confuses with one of the format's own.

@@ -32,7 +32,7 @@ mod warning;
 
 pub use crate::error::FormatError;
 pub use crate::export::{CellTable, write_csv, write_npz, write_ply, write_vtu};
-pub use crate::exr::write_exr;
+pub use crate::exr::{write_exr, write_exr_aovs};
 pub use crate::gltf::write_glb;
 pub use crate::limits::Limits;
 pub use crate::obj::{ObjFiles, write_obj};

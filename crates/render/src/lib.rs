@@ -4,6 +4,7 @@
 //! terminal. `picture` is the paper's own image: the patches as a camera sees them; `display` turns radiance into
 //! pixels that a screen shows; `reference` needs no solution and shares no transport with the solver.
 
+mod aovs;
 pub mod compare;
 mod direct;
 pub mod display;
@@ -19,6 +20,7 @@ pub mod reference;
 mod sums;
 mod vertex;
 
+pub use aovs::{AovOptions, Aovs, aovs};
 pub use display::{Exposure, PhysicalCamera, ToneCurve, WhiteBalance};
 pub use film::Crop;
 pub use gather::{Gather, GatherOptions};

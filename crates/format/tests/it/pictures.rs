@@ -2,8 +2,9 @@
 
 use std::io::Cursor;
 
-use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, Vec2, read};
-use twinray_format::{write_exr, write_png};
+use exr::prelude::{AttributeValue, FlatSamples, ReadChannels, ReadLayers, Vec2, read};
+use twinray_format::{Limits, read_picture, write_exr, write_exr_aovs, write_png};
+use twinray_render::Aovs;
 
 #[test]
 fn png_keeps_pixels_text_and_colour_space() {
@@ -73,4 +74,54 @@ fn exr_keeps_values_and_says_what_they_mean() {
 
 fn contains(bytes: &[u8], word: &[u8]) -> bool {
     bytes.windows(word.len()).any(|w| w == word)
+}
+
+/// All output variables lie beside R, G and B under their usual names, and whoever knows none of them reads the picture.
+#[test]
+fn output_variables_come_back() {
+    let (width, height) = (7, 5);
+    let count = width as usize * height as usize;
+    let floats = |first: f32| (0..count).map(|i| first + i as f32).collect::<Vec<_>>();
+    let triples =
+        |first: f32| (0..count).map(|i| [first + i as f32, first - i as f32, first * 0.5]).collect::<Vec<_>>();
+    let ids: Vec<u32> = (0..count as u32).map(|i| if i == 3 { Aovs::NO_PATCH } else { i + (1 << 30) + 1 }).collect();
+    let aovs = Aovs {
+        albedo: Some(triples(0.1)),
+        normal: Some(triples(0.2)),
+        depth: Some(floats(2.0)),
+        direct: Some(triples(0.3)),
+        indirect: Some(triples(0.4)),
+        patch: Some(ids.clone()),
+        error: Some(floats(3.0)),
+    };
+    let pixels = triples(0.9);
+    let bytes = write_exr_aovs(width, height, &pixels, &aovs, None, &[("rays", "9")]);
+    assert_eq!(bytes, write_exr_aovs(width, height, &pixels, &aovs, None, &[("rays", "9")]), "equal arguments");
+    assert_eq!(read_picture("a.exr", &bytes, &Limits::default()).unwrap().image.pixels, pixels);
+
+    let file = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let channels = file.from_buffered(Cursor::new(&bytes)).unwrap().layer_data.channel_data.list;
+    let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+    let expected = "B G R albedo.B albedo.G albedo.R depth.Z direct.B direct.G direct.R error.Y indirect.B indirect.G \
+        indirect.R normal.X normal.Y normal.Z patch.id";
+    assert_eq!(names.join(" "), expected);
+    let values = |name: &str| channels.iter().find(|c| c.name == *name).unwrap().sample_data.clone();
+    let third = |t: &Option<Vec<[f32; 3]>>| FlatSamples::F32(t.as_ref().unwrap().iter().map(|v| v[2]).collect());
+    for (name, expected) in [
+        ("albedo.B", third(&aovs.albedo)),
+        ("normal.Z", third(&aovs.normal)),
+        ("direct.B", third(&aovs.direct)),
+        ("indirect.B", third(&aovs.indirect)),
+        ("depth.Z", FlatSamples::F32(floats(2.0))),
+        ("error.Y", FlatSamples::F32(floats(3.0))),
+        ("patch.id", FlatSamples::U32(ids)),
+    ] {
+        assert_eq!(values(name), expected, "{name}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "an output variable has not 2×1 pixels")]
+fn output_variables_of_another_size_are_refused() {
+    write_exr_aovs(2, 1, &[[0.0; 3]; 2], &Aovs { depth: Some(vec![0.0]), ..Aovs::default() }, None, &[]);
 }

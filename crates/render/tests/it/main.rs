@@ -1,6 +1,7 @@
 //! Pictures of scenes whose picture is known, and what smoothing must and must not do.
 
 mod agreement;
+mod aovs;
 mod cameras;
 mod flip;
 mod reference;

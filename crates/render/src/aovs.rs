@@ -1,0 +1,120 @@
+//! What else is known of the pixels beside their radiance: for compositing, denoising and looking into a solution.
+//!
+//! [`aovs`] finds what the scene alone decides, for any method; direct and indirect light and errors are filled in by the
+//! methods that know them. Not here: names of channels in files (format).
+
+use glam::DVec3;
+use rayon::prelude::*;
+use twinray_scene::{Camera, PatchScene, Rgb};
+
+use crate::film::{Crop, Film};
+use crate::picture::first_side;
+
+/// Arbitrary output variables, each `[height, width]` if it is there, first row on top.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Aovs {
+    /// Albedo towards the camera of what is seen, linear Rec. 709; black where nothing is.
+    pub albedo: Option<Vec<[f32; 3]>>,
+    /// Shading normal in world space, on the side that is seen; shorter than 1 where a pixel sees several, 0 where nothing.
+    pub normal: Option<Vec<[f32; 3]>>,
+    /// Depth of what is seen, metres, see [`Camera::depth`]; [`Aovs::NO_DEPTH`] where nothing is.
+    pub depth: Option<Vec<f32>>,
+    /// Radiance of emitters and what surfaces reflect of light that comes straight from them, W·sr⁻¹·m⁻² (or nit).
+    pub direct: Option<Vec<[f32; 3]>>,
+    /// Radiance of what surfaces reflect of other light; with `direct` the whole radiance.
+    pub indirect: Option<Vec<[f32; 3]>>,
+    /// Number of the patch that the first sample of a pixel sees; [`Aovs::NO_PATCH`] where there is none.
+    pub patch: Option<Vec<u32>>,
+    /// Standard error of the pixel's luminance, W·sr⁻¹·m⁻² (or nit).
+    pub error: Option<Vec<f32>>,
+}
+
+impl Aovs {
+    /// Depth where nothing is seen: finite, so that filters survive it, and the value that Blender writes.
+    pub const NO_DEPTH: f32 = 1e10;
+    /// The patch where none is seen.
+    pub const NO_PATCH: u32 = u32::MAX;
+}
+
+/// Settings of [`aovs`].
+#[derive(Clone, Copy, Debug)]
+pub struct AovOptions {
+    /// Pixels in a row of the whole film.
+    pub width: u32,
+    /// Rows of the whole film.
+    pub height: u32,
+    /// The part of the film that is wanted, within it; `None` for all of it.
+    pub crop: Option<Crop>,
+    /// Camera rays per pixel; a picture of as many by `render` has the same rays, so that edges agree.
+    pub samples: u32,
+}
+
+/// Albedo, normal, depth and patch of what each pixel sees: means over its samples, depths over those that see anything.
+///
+/// # Panics
+/// If the crop is not within the film.
+pub fn aovs(scene: &PatchScene, camera: &Camera, options: &AovOptions) -> Aovs {
+    let film = Film::new(options.width, options.height, options.crop);
+    let pixels: Vec<Seen> = (0..film.len())
+        .into_par_iter()
+        .map(|index| {
+            let at = film.place(index);
+            let mut sum = Seen::default();
+            for k in 0..options.samples {
+                let ray = film.sample(camera, at, k);
+                let seen = ray.and_then(|(origin, direction)| seen(scene, camera, origin, direction));
+                sum.add(seen.as_ref(), k == 0);
+            }
+            sum
+        })
+        .collect();
+    let n = f64::from(options.samples.max(1));
+    Aovs {
+        albedo: Some(pixels.iter().map(|p| (p.albedo / n).to_f32()).collect()),
+        normal: Some(pixels.iter().map(|p| (p.normal / n).as_vec3().to_array()).collect()),
+        depth: Some(pixels.iter().map(Seen::mean_depth).collect()),
+        patch: Some(pixels.iter().map(|p| p.patch.unwrap_or(Aovs::NO_PATCH)).collect()),
+        ..Aovs::default()
+    }
+}
+
+/// What a ray sees, or sums over the rays of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    albedo: Rgb,
+    normal: DVec3,
+    depth: f64,
+    hits: u32,
+    patch: Option<u32>,
+}
+
+impl Seen {
+    fn add(&mut self, other: Option<&Seen>, is_first: bool) {
+        let Some(other) = other else { return };
+        self.albedo += other.albedo;
+        self.normal += other.normal;
+        self.depth += other.depth;
+        self.hits += 1;
+        if is_first {
+            self.patch = other.patch;
+        }
+    }
+
+    fn mean_depth(&self) -> f32 {
+        if self.hits == 0 { Aovs::NO_DEPTH } else { (self.depth / f64::from(self.hits)) as f32 }
+    }
+}
+
+/// What a ray of the world meets first.
+fn seen(scene: &PatchScene, camera: &Camera, origin: DVec3, direction: DVec3) -> Option<Seen> {
+    let (hit, patch) = first_side(scene, origin - scene.centre(), direction)?;
+    let brdf = scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v));
+    let cosine = scene.normal(patch).dot(-direction).max(0.0);
+    Some(Seen {
+        albedo: brdf.albedo(cosine),
+        normal: scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v),
+        depth: camera.depth(scene.point_of(hit.triangle, hit.u, hit.v) + scene.centre()),
+        hits: 1,
+        patch: Some(patch.0),
+    })
+}
