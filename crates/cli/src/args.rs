@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
 
+use crate::display::DisplayArgs;
+
 /// The light of a whole scene, by bi-directional rays.
 #[derive(Debug, Parser)]
 #[command(name = "twinray", version, about, arg_required_else_help = true)]
@@ -23,7 +25,7 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Solve a scene and take a picture of it, or take one of a .twin file's light
-    Render(RenderArgs),
+    Render(Box<RenderArgs>),
     /// Solve a scene and keep the light of its patches in a .twin file, or go on with one
     Solve(SolutionArgs),
     /// Add up solves of one scene that were made with different seeds or as parts
@@ -234,12 +236,9 @@ pub struct RenderArgs {
     /// With --method patches, reflections in glossy surfaces: traced per pixel, or as patches remember them [default: traced]
     #[arg(long, value_enum)]
     pub lobes: Option<LobesArg>,
-    /// Exposure of PNGs: auto, or stops (EV) on radiance
-    #[arg(long, value_name = "auto|EV", default_value = "auto", allow_hyphen_values = true, value_parser = exposure)]
-    pub exposure: ExposureArg,
-    /// Tone curve of PNGs
-    #[arg(long, value_enum, default_value = "agx")]
-    pub tone: ToneArg,
+    /// Film, lens and screen.
+    #[command(flatten)]
+    pub display: DisplayArgs,
 }
 
 /// How a picture is made.
@@ -315,24 +314,6 @@ pub enum LobesArg {
     Traced,
     /// From the patches alone.
     Patches,
-}
-
-/// Exposures.
-#[derive(Clone, Copy, Debug)]
-pub enum ExposureArg {
-    /// From the picture.
-    Auto,
-    /// Given stops.
-    Stops(f64),
-}
-
-/// Tone curves.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum ToneArg {
-    /// AgX-like.
-    Agx,
-    /// Clip at 1.
-    None,
 }
 
 /// `twinray reference`.
@@ -539,14 +520,6 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or(expected)?;
     let side = |s: &str| s.trim().parse().ok().filter(|n| (1..=16384).contains(n)).ok_or(expected);
     Ok((side(w)?, side(h)?))
-}
-
-fn exposure(text: &str) -> Result<ExposureArg, String> {
-    if text == "auto" {
-        return Ok(ExposureArg::Auto);
-    }
-    let stops: f64 = text.parse().map_err(|_| "expected auto or a number of stops, such as -2.5")?;
-    if stops.is_finite() { Ok(ExposureArg::Stops(stops)) } else { Err("expected a finite number of stops".into()) }
 }
 
 #[cfg(test)]

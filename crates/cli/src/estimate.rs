@@ -27,6 +27,8 @@ const LOOK_BYTES_PER_SEEN_PATCH: usize = 150;
 /// Bytes of a pixel while its picture is made and encoded, and of one that paths are traced for.
 const PICTURE_BYTES_PER_PIXEL: usize = 60;
 const PATH_BYTES_PER_PIXEL: usize = 120;
+/// The same for its layers: sums, what they become, and that as channels.
+const LAYER_BYTES_PER_PIXEL: usize = 200;
 /// What a thread keeps at hand: its stack as far as it is used, tasks of rays, the allocator's share.
 const THREAD_BYTES: usize = 1 << 20;
 /// The program and what is not worth an estimate of its own.
@@ -56,6 +58,8 @@ pub struct PictureWork {
     pub samples: u32,
     /// Whether its pixels are traced, without a solve.
     pub is_traced: bool,
+    /// Whether it has layers beside radiance.
+    pub has_layers: bool,
 }
 
 /// Rays of a solve.
@@ -182,6 +186,7 @@ fn with(cut: &Estimate, [now, most_so_far]: [u64; 2], work: &Work, pixels: usize
             true => PATH_BYTES_PER_PIXEL * pixels,
             false => after.max(look + PICTURE_BYTES_PER_PIXEL * pixels),
         };
+        after += if picture.has_layers { LAYER_BYTES_PER_PIXEL * pixels } else { 0 };
     }
     let more = cut.peak_bytes.max(cut.bytes + after) + THREAD_BYTES * rayon::current_num_threads();
     Expected { cut: *cut, memory: most_so_far.max(now + more as u64), rays, file }

@@ -35,6 +35,11 @@ pub struct Loaded {
 }
 
 impl Loaded {
+    /// The scene's unit of length.
+    pub fn metres_per_unit(&self) -> f64 {
+        self.source.metres_per_unit
+    }
+
     /// Where the scene is, as seen from a folder, and how it was cut.
     pub fn source_seen_from(&self, folder: &Path) -> SceneSource {
         SceneSource { file: stored::seen_from(&self.source.file, folder), ..self.source.clone() }

@@ -20,6 +20,7 @@ fn plain(text: &str) -> String {
 
 mod args;
 mod commands;
+mod display;
 mod estimate;
 mod failure;
 mod files;

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use twinray_scene::{Camera, PatchScene, Rgb};
+use twinray_scene::{Camera, PatchScene, Rgb, Side};
 
 use crate::film::{Crop, Film};
 use crate::picture::first_side;
@@ -108,11 +108,13 @@ impl Seen {
 /// What a ray of the world meets first.
 fn seen(scene: &PatchScene, camera: &Camera, origin: DVec3, direction: DVec3) -> Option<Seen> {
     let (hit, patch) = first_side(scene, origin - scene.centre(), direction)?;
-    let brdf = scene.brdf_of(hit.triangle, scene.color_at(hit.triangle, hit.u, hit.v));
+    let surface = scene.surface_at(&hit, 0.0);
     let cosine = scene.normal(patch).dot(-direction).max(0.0);
+    // Mirrors and glass have what they are seen to reflect and let through, as denoisers expect.
+    let passed = surface.scatter.specular.map_or(Rgb::BLACK, |s| s.passed(cosine, hit.side == Side::Back));
     Some(Seen {
-        albedo: brdf.albedo(cosine),
-        normal: scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v),
+        albedo: surface.scatter.brdf.albedo(cosine) + passed,
+        normal: surface.normal,
         depth: camera.depth(scene.point_of(hit.triangle, hit.u, hit.v) + scene.centre()),
         hits: 1,
         patch: Some(patch.0),

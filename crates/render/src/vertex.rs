@@ -61,16 +61,13 @@ impl Vertex {
     /// Where a ray from direction `wo` (towards its origin) met `patch`.
     pub fn new(scene: &PatchScene, hit: &SurfaceHit, patch: PatchId, wo: DVec3, look: Look) -> Self {
         let geometric = scene.normal(patch);
-        let normal = match look {
+        let (scatter, normal) = match look {
             Look::Display => {
-                let smooth = scene.normal_at(hit, 0.0);
-                if smooth.dot(wo) > 0.0 { smooth } else { geometric }
+                let bent = scene.normal_at(hit, 0.0);
+                (scene.scatter_at(hit, Detail::Picture), if bent.dot(wo) > 0.0 { bent } else { geometric })
             }
-            _ => geometric,
-        };
-        let scatter = match look {
-            Look::Patch => scene.scatter(patch),
-            _ => scene.scatter_at(hit, Detail::Picture),
+            Look::Plain => (scene.scatter_at(hit, Detail::Picture), geometric),
+            Look::Patch => (scene.scatter(patch), geometric),
         };
         let point = scene.point_of(hit.triangle, hit.u, hit.v);
         Self { patch, point, geometric, normal, scatter, inside: hit.side == Side::Back }

@@ -4,12 +4,14 @@ use std::time::Instant;
 
 use anyhow::bail;
 use serde_json::json;
-use twinray::render::{Gather, GatherOptions};
+use twinray::render::{Aovs, Gather, GatherOptions};
 use twinray::scene::Camera;
 
-use super::render::{Light, default_output, default_size, encode, exposure, light};
+use super::path::MOST_LAYER_SAMPLES;
+use super::render::{Light, default_output, encode, light};
 use crate::args::RenderArgs;
 use crate::commands::{self, solving};
+use crate::display::{self, AovArg, Film};
 use crate::failure::Ending;
 use crate::input::Loaded;
 use crate::interrupt;
@@ -39,6 +41,7 @@ pub(super) fn run(
     args: &RenderArgs,
     loaded: &Loaded,
     camera: &Camera,
+    film: Film,
     output: Output,
     loading: f64,
 ) -> anyhow::Result<Ending> {
@@ -69,15 +72,15 @@ pub(super) fn run(
         );
     }
 
-    let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
-    let pixels = u64::from(width) * u64::from(height);
+    let Film { width, height, crop } = film;
+    let pixels = u64::from(film.size().0) * u64::from(film.size().1);
     // With --samples beside --time or --error, whichever is reached first.
     let left = args.solve.time.map(|s| Goal::Seconds((s - seconds).max(0.0)));
     let until = left.or(args.solve.error.map(Goal::Error));
     let most = args.path.samples.unwrap_or(if until.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
     let goal = until.unwrap_or(Goal::Rays(u64::from(most) * pixels));
     let mut progress = Progress::new(goal, args.load.quiet).counting("camera rays");
-    let options = GatherOptions { width, height, seed: settings.seed, adaptive: true };
+    let options = GatherOptions { width, height, crop, seed: settings.seed, adaptive: true };
     let mut gather = Gather::new(&loaded.patches, &solution, camera, &options);
     loop {
         let next = (gather.samples() * GROWTH).max(FIRST_SAMPLES).min(f64::from(most));
@@ -96,8 +99,9 @@ pub(super) fn run(
     let gathering = progress.seconds();
 
     let start = Instant::now();
-    let picture = gather.picture();
-    let factor = exposure(args).factor(&picture);
+    let mut picture = gather.picture();
+    let layers = layers(args, loaded, camera, &film, &gather);
+    let factor = args.display.exposure.factor(&picture);
     let how = format!(
         "{} rays, {:.1} camera rays per pixel, seed {}, preset {:?}",
         solution.rays(),
@@ -105,7 +109,7 @@ pub(super) fn run(
         settings.seed,
         settings.preset
     );
-    output.write(&encode(args, loaded, &picture, factor, &how, &path))?;
+    output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
     let error = gather.relative_error();
     let camera_rate = gather.rays() as f64 / gathering.max(1e-9);
@@ -140,4 +144,22 @@ pub(super) fn run(
         println!("{report:#}");
     }
     Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+/// The layers that are wanted. Direct light holds what emits and is seen itself, so that it and indirect light add up to
+/// the picture.
+fn layers(args: &RenderArgs, loaded: &Loaded, camera: &Camera, film: &Film, gather: &Gather) -> Aovs {
+    let wants = |layer| args.display.wants(layer);
+    let samples = (gather.samples().ceil() as u32).min(MOST_LAYER_SAMPLES);
+    let mut layers = display::layers(args, loaded, camera, film, samples);
+    if wants(AovArg::Direct) {
+        layers.direct = Some(gather.direct());
+    }
+    if wants(AovArg::Indirect) {
+        layers.indirect = Some(gather.indirect());
+    }
+    if wants(AovArg::Error) {
+        layers.error = Some(gather.variance().iter().map(|v| v.sqrt()).collect());
+    }
+    layers
 }

@@ -7,8 +7,9 @@ use serde_json::json;
 use twinray::render::reference::{PathPictureOptions, PixelTracer, Technique};
 use twinray::scene::Camera;
 
-use super::render::{default_output, default_size, encode, exposure};
+use super::render::{default_output, encode};
 use crate::args::{Preset, RenderArgs};
+use crate::display::{self, AovArg, Film};
 use crate::failure::Ending;
 use crate::input::Loaded;
 use crate::interrupt;
@@ -19,6 +20,9 @@ use crate::progress::{Goal, Progress};
 const DEFAULT_SAMPLES: u32 = 64;
 /// Paths per pixel before an estimated error is believed.
 const FIRST_SAMPLES: u32 = 16;
+
+/// Samples of a pixel beyond which its layers no longer change to speak of.
+pub(super) const MOST_LAYER_SAMPLES: u32 = 64;
 
 /// Refuses settings of the solver, which would be ignored.
 pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
@@ -41,19 +45,20 @@ pub(super) fn run(
     args: &RenderArgs,
     loaded: &Loaded,
     camera: &Camera,
+    film: Film,
     output: Output,
     loading: f64,
 ) -> anyhow::Result<Ending> {
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
-    let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
-    let pixels = u64::from(width) * u64::from(height);
+    let Film { width, height, crop } = film;
+    let pixels = u64::from(film.size().0) * u64::from(film.size().1);
     // With --samples beside --time or --error, whichever is reached first.
     let until = args.solve.time.map(Goal::Seconds).or(args.solve.error.map(Goal::Error));
     let most = args.path.samples.unwrap_or(if until.is_some() { u32::MAX } else { DEFAULT_SAMPLES });
     let goal = until.unwrap_or(Goal::Rays(u64::from(most) * pixels));
     let mut progress = Progress::new(goal, args.load.quiet).counting("paths");
     let seed = args.solve.seed.unwrap_or(1);
-    let options = PathPictureOptions { width, height, crop: None, samples: most, seed, technique: Technique::Both };
+    let options = PathPictureOptions { width, height, crop, samples: most, seed, technique: Technique::Both };
     let mut tracer = PixelTracer::new(&loaded.patches, camera, &options);
     loop {
         tracer.advance(1);
@@ -71,10 +76,14 @@ pub(super) fn run(
     let tracing = progress.seconds();
 
     let start = Instant::now();
-    let picture = tracer.picture();
-    let factor = exposure(args).factor(&picture);
+    let mut picture = tracer.picture();
+    let mut layers = display::layers(args, loaded, camera, &film, tracer.samples().min(MOST_LAYER_SAMPLES));
+    if args.display.wants(AovArg::Error) {
+        layers.error = Some(tracer.variance().iter().map(|v| v.sqrt()).collect());
+    }
+    let factor = args.display.exposure.factor(&picture);
     let how = format!("{} paths per pixel, seed {seed}", tracer.samples());
-    output.write(&encode(args, loaded, &picture, factor, &how, &path))?;
+    output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
     let paths = pixels * u64::from(tracer.samples());

@@ -6,12 +6,13 @@ use std::time::Instant;
 use anyhow::{anyhow, bail};
 use serde_json::json;
 use twinray::format;
-use twinray::render::{self, Exposure, Lobes, Picture, PictureOptions, ToneCurve};
+use twinray::render::{self, Aovs, Lobes, Picture, PictureOptions};
 use twinray::scene::Camera;
 use twinray::solve::{Observer, Solution};
 
-use crate::args::{ExposureArg, LobesArg, MethodArg, RenderArgs, ToneArg};
+use crate::args::{LobesArg, MethodArg, RenderArgs};
 use crate::commands::{gather, path, solving};
+use crate::display::{self, DEFAULT_HEIGHT, Film};
 use crate::estimate::{PictureWork, Work};
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
@@ -22,8 +23,6 @@ use crate::{commands, interrupt, stored};
 
 /// Camera rays per pixel where the user does not say.
 const DEFAULT_SAMPLES: u32 = 16;
-/// Height of a picture where the user does not say.
-const DEFAULT_HEIGHT: u32 = 512;
 
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
@@ -32,6 +31,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         bail!("{}: expected a name that ends in .png or .exr", path.display());
     }
     let method = args.method();
+    args.display.check(method, &extension(&path))?;
     match method {
         MethodArg::Path => path::check(args)?,
         MethodArg::Gather => gather::check(args)?,
@@ -43,6 +43,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let loaded = input::load(&args.load, Some(&args.view), &work(args))?;
     let overridden = loaded.cameras.first().is_some_and(|c| c.name == "command line");
     let camera = input::pick_camera(&loaded.cameras, args.view.camera.as_deref().filter(|_| !overridden))?;
+    let camera = &display::camera(args, &loaded, camera)?;
+    let film = display::film(args, camera)?;
     let output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
@@ -51,21 +53,21 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let loading = start.elapsed().as_secs_f64();
 
     match method {
-        MethodArg::Path => return path::run(args, &loaded, camera, output, loading),
-        MethodArg::Gather => return gather::run(args, &loaded, camera, output, loading),
+        MethodArg::Path => return path::run(args, &loaded, camera, film, output, loading),
+        MethodArg::Gather => return gather::run(args, &loaded, camera, film, output, loading),
         MethodArg::Patches => {}
     }
     let goal = solving::goal(&args.solve, loaded.patches.len(), None);
     let Light { solution, settings, seconds, rate, interrupted } = light(args, &loaded, Some(camera), goal)?;
 
     let start = Instant::now();
-    let (width, height) = args.size.unwrap_or_else(|| default_size(camera));
+    let Film { width, height, crop } = film;
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
     let lobes = match args.lobes {
         None | Some(LobesArg::Traced) => Lobes::Traced,
         Some(LobesArg::Patches) => Lobes::Patches,
     };
-    let options = PictureOptions { width, height, crop: None, samples, flat: args.flat, lobes };
+    let options = PictureOptions { width, height, crop, samples, flat: args.flat, lobes };
     if !solution.is_observed() && (args.flat || matches!(lobes, Lobes::Patches)) {
         let matte = format!(
             "{}: glossy surfaces look matte with --flat and --lobes patches, since a file knows no camera: render the scene itself",
@@ -73,10 +75,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         );
         commands::print_warnings(&[matte], args.load.quiet);
     }
-    let picture = render::render(&loaded.patches, &solution, camera, &options);
-    let factor = exposure(args).factor(&picture);
+    let mut picture = render::render(&loaded.patches, &solution, camera, &options);
+    let layers = display::layers(args, &loaded, camera, &film, samples);
+    let factor = args.display.exposure.factor(&picture);
     let how = format!("{} rays, seed {}, preset {:?}", solution.rays(), settings.seed, settings.preset);
-    output.write(&encode(args, &loaded, &picture, factor, &how, &path))?;
+    output.write(&encode(args, &loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
     let balance = solution.balance();
@@ -166,7 +169,8 @@ fn work(args: &RenderArgs) -> Work {
     } else {
         solving::work(&args.solve, None)
     };
-    Work { picture: Some(PictureWork { size: args.size, samples, is_traced }), ..solve }
+    let (size, has_layers) = (args.display.expected_size(args.size), !args.display.aov.is_empty());
+    Work { picture: Some(PictureWork { size, samples, is_traced, has_layers }), ..solve }
 }
 
 pub(super) fn default_output(scene: &str) -> PathBuf {
@@ -180,34 +184,25 @@ pub fn default_size(camera: &Camera) -> (u32, u32) {
     ((f64::from(DEFAULT_HEIGHT) * aspect).round() as u32, DEFAULT_HEIGHT)
 }
 
-pub(super) fn exposure(args: &RenderArgs) -> Exposure {
-    match args.exposure {
-        ExposureArg::Auto => Exposure::Auto,
-        ExposureArg::Stops(ev) => Exposure::Stops(ev),
-    }
-}
-
-/// The bytes of the picture file; `how` says in words how the picture was made.
+/// The bytes of the picture file; `how` says in words how the picture was made. Light for a screen is balanced in place.
 pub(super) fn encode(
     args: &RenderArgs,
     loaded: &Loaded,
-    picture: &Picture,
+    picture: &mut Picture,
+    layers: &Aovs,
     factor: f64,
     how: &str,
     path: &Path,
 ) -> Vec<u8> {
-    let image = &picture.image;
     let software = concat!("twinray ", env!("CARGO_PKG_VERSION"));
     // The same settings give the same bytes: no date, no path, no thread count.
     let comment = format!("scene {}, {} patches, {how}", loaded.name, loaded.patches.len());
     let text = [("Software", software), ("Comment", comment.as_str())];
     if extension(path) == "exr" {
-        return format::write_exr(image.width, image.height, &image.pixels, None, &text);
+        let (image, white) = (&picture.image, args.display.white_luminance());
+        return format::write_exr_aovs(image.width, image.height, &image.pixels, layers, white, &text);
     }
-    let curve = match args.tone {
-        ToneArg::Agx => ToneCurve::AgX,
-        ToneArg::None => ToneCurve::None,
-    };
-    let bytes = render::display::to_srgb8(picture, factor, curve);
-    format::write_png(image.width, image.height, &bytes, &text)
+    args.display.white_balance.apply(picture);
+    let bytes = render::display::to_srgb8(picture, factor, args.display.curve());
+    format::write_png(picture.image.width, picture.image.height, &bytes, &text)
 }

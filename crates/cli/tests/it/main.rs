@@ -6,6 +6,7 @@ mod accuracy;
 mod built_in;
 mod compare;
 mod completion;
+mod display;
 mod export;
 mod faults;
 mod interrupt;

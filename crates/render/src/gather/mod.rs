@@ -90,9 +90,14 @@ impl<'a> Gather<'a> {
         sums::picture(&self.pixels(), self.film.window.width)
     }
 
-    /// The part of the picture that surfaces reflect of light straight from what emits, in every pixel, linear radiance.
+    /// The part of every pixel that is emitted where it is seen, or reflected straight from what emits; linear radiance.
     pub fn direct(&self) -> Vec<[f32; 3]> {
-        self.pixels().iter().map(|p| p.direct().to_f32()).collect()
+        self.pixels().iter().map(|p| (p.lights() + p.direct()).to_f32()).collect()
+    }
+
+    /// All other light of every pixel, linear radiance.
+    pub fn indirect(&self) -> Vec<[f32; 3]> {
+        self.pixels().iter().map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
