@@ -265,6 +265,11 @@ impl PatchScene {
         self.lights.iter().map(|light| light.power()).sum()
     }
 
+    /// The same without directional lights: power that is spent within or beside the scene, whatever its size.
+    pub fn near_lights_power(&self) -> Rgb {
+        self.lights.iter().filter(|light| !light.is_distant()).map(|light| light.power()).sum()
+    }
+
     /// Area of all patches, m²; both sides of two-sided surfaces.
     pub fn total_area(&self) -> f64 {
         self.patches().map(|p| self.area(p)).sum()

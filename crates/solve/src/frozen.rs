@@ -2,7 +2,8 @@
 //!
 //! The strategies are one density (shares sum to 1): at patches
 //! λ_i(ω) = power · q_i(ω)/P + lamps · 𝓛(E_i)/P_E + area/(π A_total) + patches · w_i/(π A_i),
-//! and λ_env(ω) = environment · pdf_line(ω) at the sky, so one formula of the balance heuristic covers them. The choice
+//! and λ_env(ω) = environment · pdf_line(ω) at the sky, so one formula of the balance heuristic covers them. Lights without
+//! area are chosen by their power; no other ray finds them. The choice
 //! is one sweep along the patches: a sum per four patches is kept, and rays come in order of their first number.
 
 use std::f64::consts::PI;
@@ -17,6 +18,7 @@ use twinray_scene::{PatchId, PatchScene, Rgb};
 use crate::glossy::GlossyPatches;
 use crate::params::Representation;
 use crate::patch_radiance::{Directional, Outgoing, stand_in};
+use crate::select::Table;
 use crate::source::{PackedRepresentative, Source};
 use crate::strategies::{STRATEGIES, Shares};
 use crate::transfer::Endpoint;
@@ -38,6 +40,8 @@ pub(crate) struct FrozenTables {
     cumulative: Vec<f64>,
     /// Per glossy patch.
     stand_ins: Vec<StandIn>,
+    /// Lights without area, by their power.
+    lights: Table,
 }
 
 /// The non-negative stand-in of a glossy patch: coefficient of its cosine part, power of its lobe part.
@@ -53,6 +57,7 @@ pub(crate) struct Frozen<'a> {
     start: Start<'a>,
     stand_ins: &'a [StandIn],
     cumulative: &'a [f64],
+    lights: &'a Table,
     /// 𝓛 of the power of all patches' stand-ins, W.
     power: f64,
     coefficients: Coefficients,
@@ -66,6 +71,22 @@ pub(crate) struct Coefficients {
     area: f64,
     patches: f64,
     environment: f64,
+    points: f64,
+    /// Of the points, over 𝓛 of the power of all of them.
+    per_light_power: f64,
+}
+
+/// Where a ray starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Choice {
+    /// On a patch.
+    Patch(PatchId),
+    /// In the environment.
+    Sky,
+    /// At a light without area, by its number.
+    Light(usize),
+    /// Nowhere: nothing has a weight.
+    Nothing,
 }
 
 /// What a wave is frozen from.
@@ -81,16 +102,19 @@ pub(crate) struct Start<'a> {
     pub emits: bool,
     /// 𝓛 of the power that patches emit, W.
     pub lamp_power: f64,
+    /// 𝓛 of the power of the lights without area, W.
+    pub light_power: f64,
     pub total_area: f64,
 }
 
 impl<'a> Frozen<'a> {
     /// Fills the tables for a wave with these shares; what has no power gives its share to the gather. O(K).
     pub(crate) fn new(start: Start<'a>, shares: Shares, tables: &'a mut FrozenTables) -> Self {
-        let FrozenTables { cumulative, stand_ins } = tables;
+        let FrozenTables { cumulative, stand_ins, lights } = tables;
         let power = fill_stand_ins(&start, stand_ins);
         let coefficients = Coefficients::new(&start, shares, power);
-        let mut this = Self { start, stand_ins, cumulative: &[], power, coefficients };
+        lights.fill(start.scene.lights().iter().map(|light| light.power().luminance()));
+        let mut this = Self { start, stand_ins, cumulative: &[], lights, power, coefficients };
         cumulative.resize(start.sources.len().div_ceil(BLOCK), 0.0);
         cumulative.par_iter_mut().enumerate().with_min_len(TASK / BLOCK).for_each(|(block, sum)| {
             *sum = this.block(block).map(|p| this.weight(p)).sum();
@@ -141,7 +165,12 @@ impl<'a> Frozen<'a> {
             Some(e) if c.environment > 0.0 => channel * e.largest_power() / c.environment,
             _ => 0.0,
         };
-        let largest = if by_patches.is_finite() { by_patches.max(by_sky) } else { by_sky };
+        let by_lights = self.start.scene.lights().iter().map(|light| {
+            let probability = c.per_light_power * light.power().luminance();
+            if probability > 0.0 { channel * light.largest_carried() / probability } else { 0.0 }
+        });
+        let beside = by_lights.fold(by_sky, f64::max);
+        let largest = if by_patches.is_finite() { by_patches.max(beside) } else { beside };
         if self.start.scene.has_specular() { largest * passing::LARGEST_FACTOR } else { largest }
     }
 
@@ -212,7 +241,7 @@ impl<'a> Frozen<'a> {
         let patches = c.patches * source.gather();
         // What is left of a density without power is a rounding, of either sign.
         let power = if c.per_power > 0.0 { (density - lamps - c.area - patches).max(0.0) } else { 0.0 };
-        [power, lamps, c.area, patches, 0.0]
+        [power, lamps, c.area, patches, 0.0, 0.0]
     }
 
     /// Probability with which a patch is chosen, but for the rounding of all of them.
@@ -236,16 +265,20 @@ impl<'a> Frozen<'a> {
         (BLOCK * block..end).map(|i| PatchId(i as u32))
     }
 
-    /// Where a ray starts, for uniform `u`: a patch, or `None` for the environment. `cursor` is where the last one
+    /// Where a ray starts, for uniform `u`. `cursor` is where the last patch
     /// was found (0 at first): rays in order of u cost O(1), rays in any order O(log K).
     #[inline]
-    pub(crate) fn select(&self, u: f64, cursor: &mut usize) -> Option<PatchId> {
-        let environment = self.coefficients.environment;
+    pub(crate) fn select(&self, u: f64, cursor: &mut usize) -> Choice {
+        let Coefficients { environment, points, .. } = self.coefficients;
         if u < environment {
-            return None;
+            return Choice::Sky;
         }
-        let total = *self.cumulative.last()?;
-        let target = ((u - environment) / (1.0 - environment)).min(1.0 - f64::EPSILON) * total;
+        let before = environment + points;
+        if u < before {
+            return Choice::Light(self.lights.select(((u - environment) / points).min(1.0 - f64::EPSILON)));
+        }
+        let Some(&total) = self.cumulative.last() else { return Choice::Nothing };
+        let target = ((u - before) / (1.0 - before)).min(1.0 - f64::EPSILON) * total;
         *cursor = gallop(self.cumulative, target, *cursor);
         let mut before = if *cursor == 0 { 0.0 } else { self.cumulative[*cursor - 1] };
         // Rounding may leave the target beyond the last weight: then the last patch that has one.
@@ -260,7 +293,16 @@ impl<'a> Frozen<'a> {
                 break;
             }
         }
-        chosen
+        chosen.map_or(Choice::Nothing, Choice::Patch)
+    }
+
+    /// A light without area as the start of a ray: what the ray carries, and the probability of the choice. Nothing weighs
+    /// against it, since no ray can meet a light.
+    #[inline]
+    pub(crate) fn light(&self, number: usize, direction: DVec3) -> Endpoint {
+        let light = &self.start.scene.lights()[number];
+        let density = self.coefficients.per_light_power * light.power().luminance();
+        Endpoint { radiance: light.carried(direction), density }
     }
 
     /// What the environment brings to a ray that leaves the scene in `towards`; black if it does not shine now.
@@ -331,6 +373,9 @@ impl Coefficients {
         if !(start.emits && start.lamp_power > 0.0) {
             freed += std::mem::take(&mut s.lamps);
         }
+        if !(start.emits && start.light_power > 0.0) {
+            freed += std::mem::take(&mut s.points);
+        }
         if power > 0.0 {
             s.power += freed;
         } else {
@@ -345,6 +390,8 @@ impl Coefficients {
             area: s.area / (PI * start.total_area),
             patches: s.patches,
             environment: s.environment,
+            points: s.points,
+            per_light_power: per(s.points, start.light_power),
         }
     }
 }

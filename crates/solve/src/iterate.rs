@@ -235,11 +235,14 @@ fn check(scene: &PatchScene, params: &Params) -> Result<(), SolveError> {
         return Err(SolveError::Setting { name: "warm start", value: params.warm_start, expected });
     }
     let sky = scene.environment().is_some_and(|e| e.power().luminance() > 0.0);
-    if scene.emitted_power().luminance() <= 0.0 && !sky {
+    let lights = scene.lights_power().luminance() > 0.0;
+    if scene.emitted_power().luminance() <= 0.0 && !sky && !lights {
         return Err(SolveError::NoLight);
     }
     match params.schedule {
         Schedule::Paper { .. } if sky => Err(SolveError::PaperEnvironment),
+        Schedule::Paper { .. } if lights => Err(SolveError::PaperLights),
+        Schedule::Waves if lights && params.shares.is_some_and(|s| s.points <= 0.0) => Err(SolveError::NoShareOfLights),
         _ => Ok(()),
     }
 }

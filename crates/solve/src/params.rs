@@ -97,8 +97,8 @@ impl Params {
 /// Why a solver cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// Nothing emits, neither a patch nor the environment: every picture is black.
-    #[error("the scene has no light: expected an emitting material or an environment")]
+    /// Nothing emits, neither a patch nor a light nor the environment: every picture is black.
+    #[error("the scene has no light: expected an emitting material, a light or an environment")]
     NoLight,
     /// A setting out of its range.
     #[error("{name} is {value}; expected {expected}")]
@@ -118,6 +118,14 @@ pub enum SolveError {
         "the paper preset selects patches only and cannot shoot from an environment: use the default preset, or light the scene with emitting surfaces"
     )]
     PaperEnvironment,
+    /// The paper's schedule knows no lights without area.
+    #[error(
+        "the paper preset selects patches only and cannot shoot from point, spot and directional lights: use the default preset, or light the scene with emitting surfaces"
+    )]
+    PaperLights,
+    /// Shares that leave lights out, which nothing else finds.
+    #[error("the share of lights without area is 0, and the scene has some: expected more than 0")]
+    NoShareOfLights,
     /// The paper's schedule goes ray by ray: there is nothing to share out.
     #[error(
         "the paper preset shoots one ray after the other and cannot be shared by processes: use the default preset, or one process"

@@ -132,9 +132,9 @@ pub enum RecordError {
     Merged,
 }
 
-/// Numbers of a [`RunRecord`]: n, wave, n at the end of the epoch, weight of the source, weight of the output, five
-/// shares, two times five sums of the fit, witnesses, energy and irradiance that are known, whether emitters count, and the tally.
-pub const RUN_WORDS: usize = 24 + TALLY_WORDS;
+/// Numbers of a [`RunRecord`]: n, wave, n at the end of the epoch, weight of the source, weight of the output, six
+/// shares, two times six sums of the fit, witnesses, energy and irradiance that are known, whether emitters count, and the tally.
+pub const RUN_WORDS: usize = 27 + TALLY_WORDS;
 /// Numbers of a [`Tally`]: rays, invalid deposits, and R, G, B of arrived, absorbed, escaped, lost, sky.
 pub const TALLY_WORDS: usize = 17;
 

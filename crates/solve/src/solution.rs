@@ -14,9 +14,9 @@ use crate::tally::Tally;
 /// Where the light goes, W (or lumen where radiance is in nit); luminances of powers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerBalance {
-    /// Emitted by patches.
+    /// Emitted by patches and by lights that have a place.
     pub emitted: f64,
-    /// Received from the environment.
+    /// Received from the environment and from directional lights.
     pub sky: f64,
     /// Absorbed by patches.
     pub absorbed: f64,

@@ -8,7 +8,7 @@
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
 /// Number of strategies.
-pub(crate) const STRATEGIES: usize = 5;
+pub(crate) const STRATEGIES: usize = 6;
 
 /// What part of the rays starts by which strategy; they sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,38 +23,51 @@ pub struct Shares {
     pub patches: f64,
     /// From the environment. Where there is none, or no lamp, their shares go to the first.
     pub environment: f64,
+    /// From the lights without area, by their power: nothing else finds them.
+    pub points: f64,
 }
 
 impl Shares {
     /// The paper's: by power alone.
-    pub const POWER: Self = Self { power: 1.0, lamps: 0.0, area: 0.0, patches: 0.0, environment: 0.0 };
+    pub const POWER: Self = Self { power: 1.0, lamps: 0.0, area: 0.0, patches: 0.0, environment: 0.0, points: 0.0 };
 
     /// What a solve begins with before it has seen anything. Under a sky most power is on roofs that send it back: more
     /// rays start where they are needed instead.
-    pub(crate) fn first(sky: bool) -> Self {
-        if sky {
-            Self { power: 0.30, lamps: 0.05, area: 0.175, patches: 0.175, environment: 0.3 }
+    pub(crate) fn first(sky: bool, lights: bool) -> Self {
+        let shares = if sky {
+            Self { power: 0.30, lamps: 0.05, area: 0.175, patches: 0.175, environment: 0.3, points: 0.0 }
         } else {
-            Self { power: 0.85, lamps: 0.05, area: 0.05, patches: 0.05, environment: 0.0 }
-        }
+            Self { power: 0.85, lamps: 0.05, area: 0.05, patches: 0.05, environment: 0.0, points: 0.0 }
+        };
+        if lights { shares.with_points(FIRST_POINTS) } else { shares }
+    }
+
+    /// The same, with a share for lights without area that all others give up in proportion.
+    pub fn with_points(self, points: f64) -> Self {
+        let mut shares = self.to_array().map(|share| share * (1.0 - points));
+        shares[STRATEGIES - 1] += points;
+        Self::from_array(shares)
     }
 
     /// A share evenly, half over area and half over patches, one from the environment, the rest by power.
     pub fn even(gather: f64, environment: f64) -> Self {
-        Self { power: 1.0 - gather - environment, lamps: 0.0, area: 0.5 * gather, patches: 0.5 * gather, environment }
+        let half = 0.5 * gather;
+        Self { power: 1.0 - gather - environment, lamps: 0.0, area: half, patches: half, environment, points: 0.0 }
     }
 
     /// In the order of the fields.
     pub fn to_array(self) -> [f64; STRATEGIES] {
-        [self.power, self.lamps, self.area, self.patches, self.environment]
+        [self.power, self.lamps, self.area, self.patches, self.environment, self.points]
     }
 
     /// From the order of the fields.
-    pub(crate) fn from_array([power, lamps, area, patches, environment]: [f64; STRATEGIES]) -> Self {
-        Self { power, lamps, area, patches, environment }
+    pub(crate) fn from_array([power, lamps, area, patches, environment, points]: [f64; STRATEGIES]) -> Self {
+        Self { power, lamps, area, patches, environment, points }
     }
 }
 
+/// First share of lights without area: all direct light of many a room.
+const FIRST_POINTS: f64 = 0.25;
 /// Least share of a strategy that was begun with: what starves cannot be found to be needed again.
 const LEAST: f64 = 0.005;
 /// Witnesses before shares are moved.
@@ -223,7 +236,7 @@ mod tests {
                 let (density, value) = if first { (2.0 * shares.power, 4.0) } else { (2.0 * shares.lamps, 1.0) };
                 let parts = if first { [density, 0.0] } else { [0.0, density] };
                 let square = (value / density) * (value / density);
-                fit.observe([square; 2], density, [parts[0], parts[1], 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
+                fit.observe([square; 2], density, [parts[0], parts[1], 0.0, 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
             }
             shares = fit.step(shares);
         }
@@ -236,7 +249,7 @@ mod tests {
     fn words_hold_all_of_it() {
         let mut fit = Fit::default();
         assert_eq!(fit.to_words(), [0; Fit::WORDS], "nothing must be all zeros");
-        fit.observe([1.0, 3.0], 0.7, [0.1, 0.2, 0.3, 0.4, 0.5], [0.5, 0.6, 0.7, 0.8, 0.9]);
+        fit.observe([1.0, 3.0], 0.7, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [0.5, 0.6, 0.7, 0.8, 0.9, 1.0]);
         let copy = Fit::from_words(fit.to_words());
         assert_eq!((copy.sums, copy.witnesses), (fit.sums, fit.witnesses));
     }
@@ -244,13 +257,15 @@ mod tests {
     #[test]
     fn nothing_starves_and_few_witnesses_change_nothing() {
         let mut fit = Fit::default();
-        let all_by_power = |fit: &mut Fit| fit.observe([1.0; 2], 1.0, [1.0, 0.0, 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
+        let all_by_power =
+            |fit: &mut Fit| fit.observe([1.0; 2], 1.0, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0; STRATEGIES]);
         all_by_power(&mut fit);
-        let first = Shares::first(false);
+        let first = Shares::first(false, true);
         assert_eq!(fit.step(first), first);
         (0..2000).for_each(|_| all_by_power(&mut fit));
         let next = fit.step(first);
-        assert!(next.lamps > 0.004 && next.area > 0.004 && next.patches > 0.004 && next.environment == 0.0);
+        assert!(next.lamps > 0.004 && next.area > 0.004 && next.patches > 0.004 && next.points > 0.004);
+        assert_eq!(next.environment, 0.0);
         assert!((next.to_array().iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 }

@@ -115,7 +115,7 @@ impl<'a> Sums<'a> {
             hits: scene.patches().map(|p| self.evidence.of(p).hits).collect(),
             glossy: glossy.clone(),
             glossy_light,
-            balance: balance(&self.tally, scene.emitted_power(), noise.rays),
+            balance: balance(&self.tally, scene.emitted_power() + scene.near_lights_power(), noise.rays),
             relative_error: noise.relative_error(),
             tally: self.tally,
             splits_direct_light: representation != Representation::Main,

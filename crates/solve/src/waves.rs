@@ -81,6 +81,8 @@ pub(crate) struct Waves {
     total_area: f64,
     /// 𝓛 of the power that patches emit, W.
     lamp_power: f64,
+    /// 𝓛 of the power of lights without area, W.
+    light_power: f64,
     shares: Shares,
     /// Witnesses of this epoch, and the n at which it ends.
     fit: Fit,
@@ -107,7 +109,10 @@ impl Waves {
             forgetting,
             total_area: scene.total_area(),
             lamp_power: scene.emitted_power().luminance(),
-            shares: around.params.shares.unwrap_or_else(|| Shares::first(scene.environment().is_some())),
+            light_power: scene.lights_power().luminance(),
+            shares: around.params.shares.unwrap_or_else(|| {
+                Shares::first(scene.environment().is_some(), scene.lights_power().luminance() > 0.0)
+            }),
             fit: Fit::default(),
             epoch: 0,
             known: Known::default(),
@@ -222,6 +227,7 @@ impl Waves {
             representation: around.params.representation,
             emits,
             lamp_power: self.lamp_power,
+            light_power: self.light_power,
             total_area: self.total_area,
         }
     }
@@ -266,6 +272,13 @@ impl Waves {
         self.n = planned;
     }
 
+    /// Share of lights without area in the first step of the warm start: that of their power among all that is known, so that
+    /// every ray carries the whole of it; a part where the sky's is not.
+    fn first_points(&self, scene: &PatchScene) -> f64 {
+        let share = self.light_power / (self.light_power + self.lamp_power);
+        if scene.environment().is_some() { 0.3 * share } else { share }
+    }
+
     /// Adds one estimate of all light to the source, and `output_weight` times as much to the output and the tally.
     /// Returns the power that was shot in total, and what the sky gave.
     fn shoot_around(
@@ -296,9 +309,11 @@ impl Waves {
                 // By power alone every ray carries the whole power, and the light of many bounces is sure.
                 _ => Shares::POWER,
             };
+            let lights = step == 0 && self.light_power > 0.0;
+            let shares = if lights { shares.with_points(self.first_points(scene)) } else { shares };
             let frozen = Frozen::new(self.start(around, &unshot, step == 0), shares, tables);
             (around.lap)(Stage::Freeze);
-            let mut power = frozen.power();
+            let mut power = frozen.power() + if lights { self.light_power } else { 0.0 };
             if step == 0 {
                 match quantum {
                     Quantum::FirstStep(_) => {}

@@ -129,7 +129,7 @@ fn damaged_files_are_named() {
         (Vec::new(), &["is no solution file"]),
         (flipped(good.len() - 20), &["section", "has been changed", "checksum"]),
         (flipped(70), &["table of sections has been changed"]),
-        (flipped(8), &["version", "reads version 2"]),
+        (flipped(8), &["version", "reads version 3"]),
     ] {
         place.write("bad.twin", bytes);
         for command in

@@ -17,7 +17,7 @@ use crate::limits::Limits;
 /// The first byte is no text, and the last ones are changed by programs that take the file for text (as in PNG).
 const MAGIC: [u8; 8] = *b"\x89TWIN\r\n\x1a";
 /// Raised when old readers would misread new files; sections may be added without.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Bytes before the table.
 const START: usize = 16;
 /// Bytes of the table for one section.

@@ -237,7 +237,7 @@ fn damage_is_named() {
     flipped[at] ^= 4;
     refused(&flipped, &["section", "has been changed", "checksum"]);
     refused(&[&bytes[..], b"more"].concat(), &["4 bytes after its last section"]);
-    refused(&container(1, &[]), &["version 1", "reads version 2", "solve again"]);
+    refused(&container(1, &[]), &["version 1", "reads version 3", "solve again"]);
     refused(&container(2, &[]), &["no such section", "\"header\""]);
     refused(&container(2, &[("a", "|u1", 1, b"x"), ("a", "|u1", 1, b"x")]), &["two sections \"a\""]);
     refused(&container(2, &[("", "|u1", 1, b"x")]), &["ASCII"]);

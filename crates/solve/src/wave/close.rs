@@ -330,10 +330,10 @@ impl Part<'_> {
     }
 }
 
-/// The largest power of two that is not above the power of lamps and sky. As a unit it changes no digit.
+/// The largest power of two that is not above the power of lamps, lights and sky. As a unit it changes no digit.
 fn power_of_two(scene: &PatchScene) -> f64 {
     let sky = scene.environment().map_or(0.0, |e| e.power().luminance());
-    let power = scene.emitted_power().luminance() + sky;
+    let power = (scene.emitted_power() + scene.lights_power()).luminance() + sky;
     if power > 0.0 && power.is_finite() { libm::scalbn(1.0, libm::ilogb(power).clamp(-400, 400)) } else { 1.0 }
 }
 

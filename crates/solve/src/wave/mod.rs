@@ -19,12 +19,12 @@ use twinray_scene::{PatchId, PatchScene, Rgb};
 pub(crate) use close::{Closing, OutputState, SourceState, Update};
 
 use crate::direction;
-use crate::frozen::Frozen;
+use crate::frozen::{Choice, Frozen};
 use crate::glossy::GlossyPatches;
 use crate::params::{Estimator, Representation};
 use crate::peers::Among;
 use crate::stage::{Lap, Stage};
-use crate::strategies::{Fit, Witness};
+use crate::strategies::{Fit, STRATEGIES, Witness};
 use crate::tally::Tally;
 use crate::transfer::{Endpoint, transfer};
 use deposits::{Buckets, Deposit, Deposits};
@@ -87,7 +87,7 @@ struct Bench {
 /// Where a ray started and what it met.
 #[derive(Clone, Copy, Debug)]
 struct Shot {
-    /// Where it started: a patch, or [`SKY`].
+    /// Where it started: a patch, [`SKY`], or a light from [`LIGHTS`] on.
     shooter: u32,
     /// What it met: a patch, [`SKY`] or [`BACK`].
     far: u32,
@@ -114,10 +114,17 @@ struct Passage {
 const SKY: u32 = u32::MAX;
 /// The absorbing back of a one-sided surface.
 const BACK: u32 = u32::MAX - 1;
+/// The first light without area: patches have 31 bits.
+const LIGHTS: u32 = 1 << 31;
 
 impl Shot {
     fn patch(end: u32) -> Option<PatchId> {
-        (end < BACK).then_some(PatchId(end))
+        (end < LIGHTS).then_some(PatchId(end))
+    }
+
+    /// The number of a light without area.
+    fn light(end: u32) -> Option<usize> {
+        (LIGHTS..BACK).contains(&end).then(|| (end - LIGHTS) as usize)
     }
 }
 
@@ -187,9 +194,15 @@ impl WaveContext<'_> {
     /// The ray of point `u`; `None` if its direction fell below the horizon: it carries nothing.
     #[inline]
     fn shot(&self, frozen: &Frozen, index: u64, u: [f64; 5], cursor: &mut usize) -> Option<Shot> {
-        let Some(shooter) = frozen.select(u[0], cursor) else {
-            let (point, direction) = self.scene.environment()?.sample_line([u[1], u[2]], [u[3], u[4]]);
-            return Some(Shot { shooter: SKY, far: SKY, direction, point });
+        let free = |shooter, (point, direction)| Some(Shot { shooter, far: SKY, direction, point });
+        let shooter = match frozen.select(u[0], cursor) {
+            Choice::Patch(patch) => patch,
+            Choice::Sky => return free(SKY, self.scene.environment()?.sample_line([u[1], u[2]], [u[3], u[4]])),
+            Choice::Light(k) => {
+                let ray = self.scene.lights()[k].sample_ray([u[1], u[2]], [u[3], u[4]]);
+                return free(LIGHTS + k as u32, ray);
+            }
+            Choice::Nothing => return None,
         };
         let n = self.scene.normal(shooter);
         let direction = frozen.sample(shooter, n, [u[3], u[4]])?;
@@ -247,7 +260,7 @@ impl WaveContext<'_> {
         let tells_direct = frozen.emits() && self.glossy.is_observed();
         let splits = |patch, far| {
             let lamp = tells_direct && self.glossy.number_of(patch).is_some();
-            lamp && Shot::patch(far).is_some_and(|far| frozen.is_lamp(far))
+            lamp && (Shot::light(far).is_some() || Shot::patch(far).is_some_and(|far| frozen.is_lamp(far)))
         };
         let targets = |count: &mut dyn FnMut(PatchId)| {
             for shot in shots.iter().filter(|shot| shot.far != BACK) {
@@ -263,10 +276,13 @@ impl WaveContext<'_> {
         task.deposits.prepare(buckets, glossy, targets);
 
         let Task { deposits, tally, fit } = task;
-        let endpoint = |end: u32, direction: DVec3| match Shot::patch(end) {
-            Some(patch) => frozen.endpoint(patch, direction),
-            None => frozen.sky(-direction),
+        let endpoint = |end: u32, direction: DVec3| match (Shot::patch(end), Shot::light(end)) {
+            (Some(patch), _) => frozen.endpoint(patch, direction),
+            (None, Some(light)) => frozen.light(light, direction),
+            (None, None) => frozen.sky(-direction),
         };
+        // From far away they meet outer faces and nothing at all, neither of which is a loss.
+        let is_distant = |end: u32| end == SKY || Shot::light(end).is_some_and(|k| self.scene.lights()[k].is_distant());
         for (k, shot) in shots.iter().enumerate() {
             let (arrived, factor, [stop, other_stop]) = match passages.get(k) {
                 Some(passage) => (passage.direction, passage.factor, passage.stops),
@@ -274,24 +290,28 @@ impl WaveContext<'_> {
             };
             let here = endpoint(shot.shooter, shot.direction).stopping(stop);
             if shot.far == BACK {
-                // From outside, the sky meets outer faces, whose backs absorb without a loss.
-                if shot.shooter != SKY {
+                if !is_distant(shot.shooter) {
                     tally.lost += here.radiance * factor / here.density;
                 }
                 continue;
             }
-            if shot.shooter == SKY && shot.far == SKY {
+            if is_distant(shot.shooter) && shot.far == SKY {
                 continue;
             }
-            let there = endpoint(shot.far, -arrived).stopping(other_stop);
-            let d = transfer(self.estimator, &here, &there);
+            let from_light = Shot::light(shot.shooter).is_some();
+            let (there, estimator) = match from_light {
+                // No ray comes back: whatever the estimator, all of it is the light's.
+                true => (Endpoint { radiance: Rgb::BLACK, density: 0.0 }, Estimator::Forward),
+                false => (endpoint(shot.far, -arrived).stopping(other_stop), self.estimator),
+            };
+            let d = transfer(estimator, &here, &there);
             let (on_far, on_shooter) = match passages.is_empty() {
                 true => (d.on_hit, d.on_shooter),
                 false => (d.on_hit * factor, d.on_shooter * factor),
             };
             if shot.far == SKY {
                 (tally.sky, tally.escaped) = (tally.sky + on_shooter, tally.escaped + on_far);
-            } else if shot.shooter == SKY {
+            } else if is_distant(shot.shooter) {
                 (tally.sky, tally.escaped) = (tally.sky + on_far, tally.escaped + on_shooter);
             }
             let ends = [
@@ -313,14 +333,18 @@ impl WaveContext<'_> {
                 let wi = (glossy && self.glossy.number_of(patch).is_some()).then(|| direction::pack(wi));
                 deposits.push(buckets, Deposit::new(patch, power, false), wi);
                 if splits(patch, far) {
-                    let direct = power * emitted_share(self.scene, PatchId(far), from.radiance);
+                    let share =
+                        Shot::patch(far).map_or(Rgb::WHITE, |far| emitted_share(self.scene, far, from.radiance));
+                    let direct = power * share;
                     deposits.push(buckets, Deposit::new(patch, direct, true), wi);
                 }
             }
             if let Some(witness) = witness.filter(|_| k % WITNESS == 0) {
                 let parts = |end: u32, e: &Endpoint, stop: f64| match Shot::patch(end) {
+                    _ if e.density == 0.0 => [0.0; STRATEGIES],
                     Some(patch) => frozen.parts(patch, e.density / stop).map(|p| p * stop),
-                    None => [0.0, 0.0, 0.0, 0.0, e.density],
+                    None if Shot::light(end).is_some() => [0.0, 0.0, 0.0, 0.0, 0.0, e.density],
+                    None => [0.0, 0.0, 0.0, 0.0, e.density, 0.0],
                 };
                 let squares = |end: u32, power: Rgb| Shot::patch(end).map_or([0.0; 2], |p| witness.squares(p, power));
                 let [a, b] = [squares(shot.far, on_far), squares(shot.shooter, on_shooter)];

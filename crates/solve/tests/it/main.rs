@@ -8,6 +8,7 @@ mod error_bars;
 mod estimators;
 mod invariance;
 mod laws;
+mod lights;
 mod odd_scenes;
 mod ranks;
 mod record;

@@ -27,7 +27,7 @@ fn groups(scene: &PatchScene, first_seed: u64, rays: u64, params: &Params) -> Ve
 
 /// Every variant against the first, group by group. At most 96 tests at 1e-4 each: a false-alarm rate of 1 %, some
 /// more for the normal approximation with ten seeds.
-fn agree(scene: &PatchScene, rays: u64, variants: &[(&str, Params)]) {
+pub fn agree(scene: &PatchScene, rays: u64, variants: &[(&str, Params)]) {
     let first = groups(scene, 100, rays, &variants[0].1);
     for (k, (name, params)) in (1..).zip(&variants[1..]) {
         let other = groups(scene, 1000 * k, rays, params);
@@ -45,7 +45,7 @@ fn agree(scene: &PatchScene, rays: u64, variants: &[(&str, Params)]) {
 
 /// Shares in the order power, lamps, area, patches, environment.
 fn shares([power, lamps, area, patches, environment]: [f64; 5]) -> Params {
-    let shares = Shares { power, lamps, area, patches, environment };
+    let shares = Shares { power, lamps, area, patches, environment, points: 0.0 };
     Params { shares: Some(shares), ..Params::default_preset(0) }
 }
 
