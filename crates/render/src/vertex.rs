@@ -111,7 +111,13 @@ impl Vertex {
                 }
                 let medium = specular.attenuation().filter(|_| !self.inside);
                 let straight = specular.is_pane();
-                Step::On(Way { direction, beyond: true, factor: factor * weight, medium, straight })
+                Step::On(Way {
+                    direction,
+                    beyond: true,
+                    factor: factor * (weight * specular.radiance_ratio(self.inside)),
+                    medium,
+                    straight,
+                })
             }
         }
     }

@@ -7,6 +7,7 @@
 
 use glam::DVec3;
 
+use crate::authored::{Material, Surface};
 use crate::brdf::{Event, attenuated, mirrored};
 use crate::bvh::SurfaceHit;
 use crate::patch::{PatchId, PatchScene, Side};
@@ -15,8 +16,9 @@ use crate::rgb::Rgb;
 /// Surfaces that a ray passes at most; what would go on is lost.
 const MOST_PASSED: u32 = 16;
 
-/// The most by which passing multiplies what a ray carries, stops at both ends included: (16/15)¹⁶ · 16.
-pub const LARGEST_FACTOR: f64 = 2.81 * 16.0;
+/// The most by which passing multiplies what a ray carries, stops at both ends included but not indices of refraction:
+/// (16/15)¹⁶ · 16.
+const LARGEST_FACTOR: f64 = 2.81 * 16.0;
 
 /// What a ray meets in the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +44,29 @@ pub struct Arrival {
     pub factor: Rgb,
     /// Probability of having stopped at the end: 1 but for specular surfaces.
     pub stop: f64,
+    /// Squared index of refraction where the ray started over that where it arrived. Radiance over the squared index is
+    /// what is kept on the way, and so are densities.
+    pub index_ratio: f64,
+}
+
+/// The inside of a body of glass.
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    ior: f64,
+    attenuation: Rgb,
 }
 
 impl PatchScene {
+    /// The most by which a ray of the solver multiplies what it carries beside its own density.
+    pub fn largest_factor(&self) -> f64 {
+        let index = |m: &Material| match (&m.surface, &m.transmission) {
+            (Surface::MetallicRoughness { ior, .. }, Some(_)) => ior.max(1.5),
+            _ => 1.5,
+        };
+        let largest = self.materials.iter().map(index).fold(1.5, f64::max);
+        if self.has_specular() { LARGEST_FACTOR * largest * largest } else { 1.0 }
+    }
+
     /// Probability that a ray that arrives on `patch` stops; `away` points to where it comes from.
     #[inline]
     pub fn stop_chance(&self, patch: PatchId, away: DVec3) -> f64 {
@@ -78,8 +100,11 @@ impl PatchScene {
             Some(patch) => self.trace_from(patch, point, direction),
             None => self.trace(point, direction),
         };
-        let mut ray = Arrival { end: End::Lost, direction, factor: Rgb::WHITE, stop: 1.0 };
-        let mut medium = None;
+        let mut ray = Arrival { end: End::Lost, direction, factor: Rgb::WHITE, stop: 1.0, index_ratio: 1.0 };
+        // The body that the ray is in, as far as its ends tell.
+        let start = start.filter(|&p| self.has_specular() && self.side_of(p) == Side::Back);
+        let mut medium = start.and_then(|p| self.body_of(self.triangle_of(p)));
+        let mut first_index = None;
         for _ in 0..=MOST_PASSED {
             let Some(met) = hit else { return Arrival { end: End::Sky, ..ray } };
             let Some(patch) = self.patch_of(&met) else { return Arrival { end: End::Back, ..ray } };
@@ -88,8 +113,11 @@ impl PatchScene {
             }
             let scatter = self.scatter(patch);
             let inside = met.side == Side::Back;
-            if let Some(coefficient) = self.medium_before(&met, medium) {
-                ray.factor = ray.factor * attenuated(coefficient, met.t);
+            let body = medium.or_else(|| self.body_of(met.triangle).filter(|_| inside));
+            let index = body.map_or(1.0, |b| b.ior);
+            ray.index_ratio = (*first_index.get_or_insert(index) / index).powi(2);
+            if let Some(body) = body {
+                ray.factor = ray.factor * attenuated(body.attenuation, met.t);
             }
             let Some(specular) = scatter.specular else { return Arrival { end: End::Patch(patch), ..ray } };
             let n = self.normal(patch);
@@ -110,11 +138,8 @@ impl PatchScene {
                     None => return ray,
                 },
             };
-            medium = match event {
-                Event::Transmit if !inside => specular.attenuation(),
-                Event::Reflect if inside => specular.attenuation(),
-                _ => None,
-            };
+            let stays_inside = (event == Event::Transmit) != inside;
+            medium = self.body_of(met.triangle).filter(|_| stays_inside);
             ray.factor = ray.factor * factor;
             ray.direction = next;
             let from = self.point_of(met.triangle, met.u, met.v);
@@ -124,6 +149,14 @@ impl PatchScene {
             };
         }
         ray
+    }
+
+    /// The body that a triangle encloses, if light passes and bends.
+    fn body_of(&self, triangle: u32) -> Option<Body> {
+        let material = &self.materials[self.triangles[triangle as usize].material as usize];
+        let volume = material.transmission.as_ref()?.volume?;
+        let ior = if let Surface::MetallicRoughness { ior, .. } = material.surface { ior.max(1.0) } else { 1.5 };
+        Some(Body { ior, attenuation: volume.attenuation })
     }
 
     /// What attenuates the way to a hit: the body that its back belongs to, or the one that the ray was left in.

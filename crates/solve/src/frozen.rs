@@ -11,7 +11,6 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 use twinray_scene::geom::Frame;
-use twinray_scene::passing;
 use twinray_scene::sample::warp;
 use twinray_scene::{PatchId, PatchScene, Rgb};
 
@@ -171,7 +170,7 @@ impl<'a> Frozen<'a> {
         });
         let beside = by_lights.fold(by_sky, f64::max);
         let largest = if by_patches.is_finite() { by_patches.max(beside) } else { beside };
-        if self.start.scene.has_specular() { largest * passing::LARGEST_FACTOR } else { largest }
+        largest * self.start.scene.largest_factor()
     }
 
     /// What a patch sends towards `wo`, and the density with which rays start there.

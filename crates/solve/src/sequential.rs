@@ -186,7 +186,11 @@ impl Sequential {
             End::Patch(hit) => {
                 let away = -arrival.direction;
                 let there = self.outgoing(scene, glossy, params, hit).endpoint(scene.normal(hit), away);
-                let d = transfer(params.estimator, &here.stopping(arrival.stop), &there.stopping(stop));
+                let d = transfer(
+                    params.estimator,
+                    &here.stopping(arrival.stop),
+                    &there.stopping(stop).seen_through(arrival.index_ratio),
+                );
                 let [on_hit, on_shooter] = [d.on_hit, d.on_shooter].map(|d| d * arrival.factor);
                 self.pending.push(Pending { patch: hit, deposit: on_hit, wi: away, end: 2 * index });
                 self.pending.push(Pending { patch: shooter, deposit: on_shooter, wi: direction, end: 2 * index + 1 });

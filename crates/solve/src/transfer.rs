@@ -26,6 +26,14 @@ impl Endpoint {
     }
 }
 
+impl Endpoint {
+    /// The same as it is seen from the other end, where the squared index of refraction is 1/`ratio` times that here.
+    #[inline]
+    pub fn seen_through(self, ratio: f64) -> Self {
+        Self { radiance: self.radiance * ratio, density: self.density * ratio }
+    }
+}
+
 /// Deposits on both ends of one ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Deposits {

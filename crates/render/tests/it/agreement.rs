@@ -44,7 +44,7 @@ fn solved(authored: &Scene, patches: usize, rays: u64) -> BTreeMap<String, Mean>
     runs[0].keys().map(|name| (name.clone(), over_runs(name))).collect()
 }
 
-fn agrees(authored: &Scene, coarse: usize, rays: u64, paths_per_patch: u32) {
+pub(crate) fn agrees(authored: &Scene, coarse: usize, rays: u64, paths_per_patch: u32) {
     let scene = cut(authored, 100);
     let options = IrradianceOptions { paths_per_patch, ..IrradianceOptions::default() };
     let traced = groups(authored, &scene, &reference::irradiance(&scene, &options));

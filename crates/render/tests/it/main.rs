@@ -4,7 +4,9 @@ mod agreement;
 mod aovs;
 mod cameras;
 mod flip;
+mod gather;
 mod reference;
+mod specular;
 
 use std::f64::consts::PI;
 

@@ -153,6 +153,16 @@ impl Specular {
         !self.transmittance.is_black()
     }
 
+    /// What radiance is multiplied by that is seen through the surface, from `inside` the body or from outside: the
+    /// squared ratio of the indices of refraction.
+    pub fn radiance_ratio(&self, inside: bool) -> f64 {
+        match (self.volume, inside) {
+            (None, _) => 1.0,
+            (Some(_), true) => self.ior * self.ior,
+            (Some(_), false) => 1.0 / (self.ior * self.ior),
+        }
+    }
+
     /// What the body attenuates by, 1/m.
     pub fn attenuation(&self) -> Option<Rgb> {
         self.volume.map(|v| v.attenuation).filter(|a| !a.is_black())

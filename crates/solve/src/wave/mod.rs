@@ -108,6 +108,8 @@ struct Passage {
     factor: Rgb,
     /// Probability of having stopped at the far end, and of stopping at the shooter from the other end.
     stops: [f64; 2],
+    /// Squared index of refraction at the shooter over that at the far end.
+    index_ratio: f64,
 }
 
 /// The environment as an end of a ray.
@@ -186,7 +188,7 @@ impl WaveContext<'_> {
             shots.push(shot);
             if passes {
                 let direction = shot.direction;
-                passages.push(Passage { index, direction, factor: Rgb::WHITE, stops: [1.0; 2] });
+                passages.push(Passage { index, direction, factor: Rgb::WHITE, stops: [1.0; 2], index_ratio: 1.0 });
             }
         });
     }
@@ -237,7 +239,7 @@ impl WaveContext<'_> {
             let mut random = Stream::new(self.seed, STREAM_PASSING, passage.index);
             let shooter = Shot::patch(shot.shooter);
             let arrival = self.scene.trace_through(shooter, shot.point, shot.direction, || random.uniform());
-            let Arrival { end, direction, factor, stop } = arrival;
+            let Arrival { end, direction, factor, stop, index_ratio } = arrival;
             shot.far = match end {
                 End::Patch(patch) => patch.0,
                 End::Back | End::Lost => BACK,
@@ -247,7 +249,7 @@ impl WaveContext<'_> {
                 Some(shooter) if shot.far != BACK => self.scene.stop_chance(shooter, shot.direction),
                 _ => 1.0,
             };
-            *passage = Passage { direction, factor, stops: [stop, other], ..*passage };
+            *passage = Passage { direction, factor, stops: [stop, other], index_ratio, ..*passage };
         }
     }
 
@@ -284,9 +286,9 @@ impl WaveContext<'_> {
         // From far away they meet outer faces and nothing at all, neither of which is a loss.
         let is_distant = |end: u32| end == SKY || Shot::light(end).is_some_and(|k| self.scene.lights()[k].is_distant());
         for (k, shot) in shots.iter().enumerate() {
-            let (arrived, factor, [stop, other_stop]) = match passages.get(k) {
-                Some(passage) => (passage.direction, passage.factor, passage.stops),
-                None => (shot.direction, Rgb::WHITE, [1.0; 2]),
+            let (arrived, factor, [stop, other_stop], ratio) = match passages.get(k) {
+                Some(passage) => (passage.direction, passage.factor, passage.stops, passage.index_ratio),
+                None => (shot.direction, Rgb::WHITE, [1.0; 2], 1.0),
             };
             let here = endpoint(shot.shooter, shot.direction).stopping(stop);
             if shot.far == BACK {
@@ -304,7 +306,7 @@ impl WaveContext<'_> {
                 true => (Endpoint { radiance: Rgb::BLACK, density: 0.0 }, Estimator::Forward),
                 false => (endpoint(shot.far, -arrived).stopping(other_stop), self.estimator),
             };
-            let d = transfer(estimator, &here, &there);
+            let d = transfer(estimator, &here, &there.seen_through(ratio));
             let (on_far, on_shooter) = match passages.is_empty() {
                 true => (d.on_hit, d.on_shooter),
                 false => (d.on_hit * factor, d.on_shooter * factor),
