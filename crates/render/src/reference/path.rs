@@ -139,14 +139,17 @@ impl<'a> PathTracer<'a> {
 
     /// What one shadow ray says of the light that comes straight from an emitter or the sky.
     fn shadow_ray(&self, vertex: &Vertex, wo: DVec3, random: &mut Stream) -> Rgb {
-        if self.technique == Technique::Path {
+        // Lights without area are found by shadow rays or not at all.
+        let sharp_only = self.technique == Technique::Path;
+        if sharp_only && self.scene.lights().is_empty() {
             return Rgb::BLACK;
         }
         let Vertex { patch, point, geometric, normal, scatter, .. } = vertex;
         let [choice, s, t] = std::array::from_fn(|_| random.uniform());
         let Some(light) = self.lights.sample(*point, choice, [s, t]) else { return Rgb::BLACK };
         let cosine = normal.dot(light.towards);
-        if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 || light.radiance.is_black() {
+        let unseen = cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 || light.radiance.is_black();
+        if unseen || (sharp_only && !light.is_sharp) {
             return Rgb::BLACK;
         }
         let passed = match light.end {
@@ -156,7 +159,10 @@ impl<'a> PathTracer<'a> {
         if passed.is_black() {
             return Rgb::BLACK;
         }
-        let [weight, _] = self.technique.weights(light.density, scatter.brdf.pdf(*normal, wo, light.towards));
+        let weight = match light.is_sharp {
+            true => 1.0,
+            false => self.technique.weights(light.density, scatter.brdf.pdf(*normal, wo, light.towards))[0],
+        };
         light.radiance * passed * scatter.brdf.eval(*normal, light.towards, wo) * (cosine * weight / light.density)
     }
 }

@@ -6,9 +6,14 @@
 //! errors of irradiance.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use glam::{DAffine3, DQuat, DVec3};
 use twinray_render::reference::{self, IrradianceOptions};
-use twinray_scene::{PatchId, PatchScene, Scene, builtin};
+use twinray_scene::{
+    Environment, EnvironmentMap, LightKind, LightProfile, PatchId, PatchScene, PunctualLight, RadianceMap, Rgb, Scene,
+    Sky, SkyModel, builtin,
+};
 use twinray_solve::{Params, PatchLight, Solver};
 use twinray_testkit::ztest::Mean;
 
@@ -90,4 +95,74 @@ fn through_a_door() {
 #[test]
 fn on_a_glossy_floor() {
     agrees(&builtin::hall(), 10_000, 300_000, 60);
+}
+
+/// Cornell's box with its lamp out, open at the front, which looks to +Z.
+fn unlit() -> Scene {
+    let mut scene = builtin::cornell(false);
+    scene.materials.iter_mut().for_each(|m| m.emission = Rgb::BLACK);
+    scene
+}
+
+/// A point, a spot and a measured light in the box, and parallel light from outside.
+#[test]
+fn under_lights_without_area() {
+    let mut scene = unlit();
+    let corners = scene.meshes.iter().flat_map(|m| &m.positions).map(|p| glam::Vec3::from(*p).as_dvec3());
+    let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    let size = high - low;
+    let light = |name: &str, kind, candela: f64, at: DVec3, towards: DVec3| PunctualLight {
+        name: name.into(),
+        kind,
+        intensity: Rgb::new(1.0, 0.8, 0.6) * candela,
+        transform: DAffine3::from_rotation_translation(
+            DQuat::from_rotation_arc(DVec3::NEG_Z, towards.normalize()),
+            low + size * at,
+        ),
+        profile: None,
+    };
+    let profile = LightProfile {
+        name: "two lobes".into(),
+        vertical: vec![0.0, 40.0, 60.0, 120.0],
+        horizontal: vec![0.0, 90.0, 180.0, 270.0, 360.0],
+        candela: [[1.0f32, 2.0, 0.5, 0.0], [1.0, 0.2, 0.0, 0.0]].iter().cycle().take(5).flatten().copied().collect(),
+    };
+    let square = size.x * size.x;
+    let measured = light("measured", LightKind::Point, square, DVec3::new(0.7, 0.8, 0.4), DVec3::NEG_Y);
+    scene.lights = vec![
+        light("point", LightKind::Point, square, DVec3::new(0.25, 0.8, 0.6), DVec3::Y),
+        light(
+            "spot",
+            LightKind::Spot { inner: 0.3, outer: 0.7 },
+            3.0 * square,
+            DVec3::splat(0.9),
+            DVec3::new(-1.0, -0.9, -0.8),
+        ),
+        PunctualLight { profile: Some(Arc::new(profile)), ..measured },
+        light("sun", LightKind::Directional, 1.0, DVec3::ZERO, DVec3::new(0.3, -0.5, -1.0)),
+    ];
+    agrees(&scene, 1000, 150_000, 8000);
+}
+
+/// A map of a bright window in a dim landscape.
+#[test]
+fn under_a_map() {
+    let pixel = |k: usize| match (k % 32, k / 32) {
+        (22..25, 5..8) => [40.0, 38.0, 30.0],
+        (_, row) if row < 8 => [0.4, 0.5, 0.8],
+        _ => [0.1, 0.08, 0.05],
+    };
+    let image = RadianceMap { name: "map".into(), width: 32, height: 16, pixels: (0..512).map(pixel).collect() };
+    let mut scene = unlit();
+    scene.environment = Some(Environment::Map(EnvironmentMap { image: Arc::new(image), rotation: 0.3, strength: 2.0 }));
+    agrees(&scene, 1000, 200_000, 6000);
+}
+
+#[test]
+fn under_sun_and_sky() {
+    let mut scene = unlit();
+    // From the south, which is +Z, into the open front.
+    let sky = Sky::natural(SkyModel::Preetham { turbidity: 3.0 }, Some([35.0, 170.0]));
+    scene.environment = Some(Environment::Sky(sky));
+    agrees(&scene, 1000, 200_000, 6000);
 }
