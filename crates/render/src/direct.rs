@@ -4,47 +4,11 @@
 //! that the only shadow ray goes where it matters (Talbot, Cline, Egbert, "Importance resampling for global
 //! illumination", EGSR 2005).
 
-use glam::DVec3;
-use twinray_scene::brdf::Brdf;
+use twinray_scene::brdf::Towards;
 use twinray_scene::{PatchScene, Rgb};
 
 use crate::lights::{Choice, Lights};
 use crate::vertex::Vertex;
-
-/// Which part of a BRDF.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Part {
-    /// All of it.
-    Whole,
-    /// Its lobe.
-    Lobe,
-}
-
-impl Part {
-    /// f_r of the part.
-    pub fn eval(self, brdf: &Brdf, n: DVec3, wi: DVec3, wo: DVec3) -> Rgb {
-        match self {
-            Part::Whole => brdf.eval(n, wi, wo),
-            Part::Lobe => brdf.lobe_eval(n, wi, wo),
-        }
-    }
-
-    /// A direction about proportional to the part × cosine.
-    pub fn sample(self, brdf: &Brdf, n: DVec3, wo: DVec3, u: [f64; 2]) -> Option<DVec3> {
-        match self {
-            Part::Whole => brdf.sample(n, wo, u),
-            Part::Lobe => brdf.lobe_sample(n, wo, u),
-        }
-    }
-
-    /// Density of [`Part::sample`].
-    pub fn pdf(self, brdf: &Brdf, n: DVec3, wo: DVec3, wi: DVec3) -> f64 {
-        match self {
-            Part::Whole => brdf.pdf(n, wo, wi),
-            Part::Lobe => brdf.lobe_pdf(n, wo, wi),
-        }
-    }
-}
 
 /// How lamps are chosen for shadow rays.
 #[derive(Clone, Copy)]
@@ -64,19 +28,18 @@ pub(crate) fn power_heuristic(a: f64, b: f64) -> f64 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// One sample of the radiance that a part of `vertex` reflects towards `wo` of light straight from what emits, and the
-/// lamp that it comes from. `numbers` gives pairs of uniform numbers, two for each candidate and one more.
+/// One sample of the radiance that `brdf` reflects at `vertex` of light straight from what emits, and the lamp that it
+/// comes from. `numbers` gives pairs of uniform numbers, two for each candidate and one more.
 pub(crate) fn direct(
     scene: &PatchScene,
     lights: &Lights,
     vertex: &Vertex,
-    wo: DVec3,
-    part: Part,
+    brdf: &Towards,
     shadows: Shadows,
     mut numbers: impl FnMut() -> [f64; 2],
 ) -> (Rgb, Option<usize>) {
     let Shadows { choice: by, candidates } = shadows;
-    let Vertex { point, geometric, normal, scatter, .. } = vertex;
+    let Vertex { point, geometric, normal, .. } = vertex;
     let (mut sum, mut chosen) = (0.0, None);
     let [mut pick, _] = numbers();
     for _ in 0..candidates {
@@ -86,9 +49,9 @@ pub(crate) fn direct(
         if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 {
             continue;
         }
-        let (a, b) = (f64::from(candidates) * light.density, part.pdf(&scatter.brdf, *normal, wo, light.towards));
+        let (a, b) = (f64::from(candidates) * light.density, brdf.pdf(light.towards));
         let density = a / power_heuristic(a, b);
-        let gives = light.radiance * part.eval(&scatter.brdf, *normal, light.towards, wo) * (cosine / density);
+        let gives = light.radiance * brdf.eval(light.towards) * (cosine / density);
         let luminance = gives.luminance();
         if luminance > 0.0 {
             sum += luminance;

@@ -13,7 +13,7 @@ use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Part, Shadows, direct, power_heuristic};
+use crate::direct::{Shadows, direct, power_heuristic};
 use crate::film::{Crop, Film};
 use crate::image::Image;
 use crate::lights::Lights;
@@ -235,7 +235,8 @@ impl View<'_> {
                         let mut random = Stream::new(0, 0x1A39, u.index);
                         let numbers = || [random.uniform(), random.uniform()];
                         let shadows = Shadows { choice: lamps.by_power(), candidates: LAMPS };
-                        met + direct(self.scene, lamps, vertex, wo, Part::Lobe, shadows, numbers).0
+                        met + direct(self.scene, lamps, vertex, &brdf.lobe_towards(vertex.normal, wo), shadows, numbers)
+                            .0
                     }
                 };
                 direct + traced * (limit / traced.luminance().max(1e-300)).min(1.0)

@@ -4,12 +4,12 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use twinray_scene::brdf::attenuated;
+use twinray_scene::brdf::{Towards, attenuated};
 use twinray_scene::sample::PixelSample;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Part, Shadows, direct, power_heuristic};
+use crate::direct::{Shadows, direct, power_heuristic};
 use crate::lights::Lights;
 use crate::picture::first_side;
 use crate::reconstruct::Reconstruction;
@@ -51,8 +51,8 @@ pub(super) struct Sight {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     pub vertex: Vertex,
-    /// Towards the eye.
-    pub wo: DVec3,
+    /// The BRDF as the eye sees it.
+    pub brdf: Towards,
     /// Of the way to the eye.
     pub throughput: Rgb,
 }
@@ -115,7 +115,8 @@ impl<'a> Estimator<'a> {
             let way = match vertex.step(wo, event, || numbers.pair()) {
                 Step::End => break,
                 Step::Scatter(factor) => {
-                    sight.point = Some(Point { vertex, wo, throughput: throughput * factor });
+                    let brdf = vertex.scatter.brdf.towards(vertex.normal, wo);
+                    sight.point = Some(Point { vertex, brdf, throughput: throughput * factor });
                     break;
                 }
                 Step::On(way) => way,
@@ -134,16 +135,15 @@ impl<'a> Estimator<'a> {
     /// Light straight from what emits that a point reflects to the eye, and the lamp that it comes from.
     pub fn lit(&self, point: &Point, shadows: Shadows, numbers: &mut PixelSample) -> (Rgb, Option<usize>) {
         numbers.jump(PAIRS * u64::from(MOST_MET + 1));
-        let (light, lamp) =
-            direct(self.scene, &self.lights, &point.vertex, point.wo, Part::Whole, shadows, || numbers.pair());
+        let (light, lamp) = direct(self.scene, &self.lights, &point.vertex, &point.brdf, shadows, || numbers.pair());
         (point.throughput * light, lamp)
     }
 
     /// Traces the gather ray of a point; `u` chooses its direction. `None` where the BRDF's choice is below the surface.
     pub fn gather(&self, point: &Point, u: [f64; 2], shadows: Shadows, numbers: &mut PixelSample) -> Option<Gathered> {
-        let Vertex { geometric, normal, scatter, .. } = &point.vertex;
-        let direction = scatter.brdf.sample(*normal, point.wo, u)?;
-        let density = scatter.brdf.pdf(*normal, point.wo, direction);
+        let Vertex { geometric, normal, .. } = &point.vertex;
+        let direction = point.brdf.sample(u)?;
+        let density = point.brdf.pdf(direction);
         if !(normal.dot(direction) > 0.0 && density > 0.0 && geometric.dot(direction) > 0.0) {
             return None;
         }
@@ -210,18 +210,18 @@ impl<'a> Estimator<'a> {
                     }
                     let read = self.read(&vertex, &hit, wo, &before, count, event[1]);
                     radiance += throughput * read.radiance;
-                    let Some((part, factor)) = read.part else { break };
+                    let Some((brdf, factor)) = read.traced else { break };
                     throughput *= factor;
                     let u = numbers.pair();
-                    let (light, _) = direct(scene, &self.lights, &vertex, wo, part, own, || numbers.pair());
+                    let (light, _) = direct(scene, &self.lights, &vertex, &brdf, own, || numbers.pair());
                     radiance += throughput * light;
-                    let Vertex { geometric, normal, scatter, .. } = &vertex;
-                    let Some(next) = part.sample(&scatter.brdf, *normal, wo, u) else { break };
-                    let (cosine, density) = (normal.dot(next), part.pdf(&scatter.brdf, *normal, wo, next));
+                    let Vertex { geometric, normal, .. } = &vertex;
+                    let Some(next) = brdf.sample(u) else { break };
+                    let (cosine, density) = (normal.dot(next), brdf.pdf(next));
                     if !(cosine > 0.0 && density > 0.0 && geometric.dot(next) > 0.0) {
                         break;
                     }
-                    throughput = throughput * part.eval(&scatter.brdf, *normal, next, wo) * (cosine / density);
+                    throughput = throughput * brdf.eval(next) * (cosine / density);
                     count += 1;
                     before = Before { point: vertex.point, density, distance: 0.0, lit: Some(own) };
                     (direction, beyond, medium) = (next, false, None);
@@ -253,7 +253,7 @@ impl<'a> Estimator<'a> {
         let last = count >= MOST_SCATTERED;
         let side = self.scene.cell_area(vertex.patch).sqrt();
         if before.distance < SHORT * side && !last {
-            return Read { radiance: Rgb::BLACK, part: Some((Part::Whole, 1.0)) };
+            return Read { radiance: Rgb::BLACK, traced: Some((vertex.scatter.brdf.towards(vertex.normal, wo), 1.0)) };
         }
         let brdf = &vertex.scatter.brdf;
         let cosine = vertex.normal.dot(wo).max(0.0);
@@ -265,10 +265,11 @@ impl<'a> Estimator<'a> {
         let base = brdf.base_reflectance(cosine);
         let radiance = irradiance * (if last { base + lobe } else { base }) / PI;
         if last || lobe.is_black() {
-            return Read { radiance, part: None };
+            return Read { radiance, traced: None };
         }
         let survival = lobe.max_channel().clamp(LEAST_SURVIVAL, 1.0);
-        Read { radiance, part: (u < survival).then_some((Part::Lobe, 1.0 / survival)) }
+        let traced = (u < survival).then(|| (brdf.lobe_towards(vertex.normal, wo), 1.0 / survival));
+        Read { radiance, traced }
     }
 
     fn irradiance(&self, patch: PatchId) -> Rgb {
@@ -279,5 +280,5 @@ impl<'a> Estimator<'a> {
 /// What is read of the solution, and the part of a BRDF that is traced, with one over the probability of that.
 struct Read {
     radiance: Rgb,
-    part: Option<(Part, f64)>,
+    traced: Option<(Towards, f64)>,
 }

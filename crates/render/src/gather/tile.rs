@@ -147,7 +147,7 @@ fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
             if geometry <= 0.0 || point.vertex.geometric.dot(direction) <= 0.0 {
                 continue;
             }
-            densities += geometry * point.vertex.scatter.brdf.pdf(point.vertex.normal, point.wo, direction);
+            densities += geometry * point.brdf.pdf(direction);
             gives[j] = reflected(point, direction) * geometry;
         }
         if densities > 0.0 {
@@ -161,7 +161,7 @@ fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
 /// Factor of what a point reflects to the eye of the radiance from `direction`: throughput · f_r · cosine.
 fn reflected(point: &Point, direction: DVec3) -> Rgb {
     let cosine = point.vertex.normal.dot(direction).max(0.0);
-    point.throughput * point.vertex.scatter.brdf.eval(point.vertex.normal, direction, point.wo) * cosine
+    point.throughput * point.brdf.eval(direction) * cosine
 }
 
 /// Adds a pixel's sample to its sums.

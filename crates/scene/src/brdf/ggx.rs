@@ -101,6 +101,16 @@ impl Ggx {
         self.diffuse * ((1.0 - coat(ci)) * (1.0 - coat(co)) / (PI * (1.0 - self.mean_coat())))
     }
 
+    /// The base's part of f_r over what the other direction's cosine gives it, [`Ggx::base_under`].
+    pub(super) fn base_towards(&self, co: f64) -> Rgb {
+        self.diffuse * ((1.0 - self.coat_albedo(co)) / (PI * (1.0 - self.mean_coat())))
+    }
+
+    /// The part of the base that a direction's cosine decides.
+    pub(super) fn base_under(&self, ci: f64) -> f64 {
+        1.0 - self.coat_albedo(ci)
+    }
+
     /// Cosine-weighted mean of the coat's albedo, Ē.
     fn mean_coat(&self) -> f64 {
         if self.is_sharp {

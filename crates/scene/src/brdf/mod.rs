@@ -10,6 +10,7 @@ mod phong;
 mod scatter;
 mod specular;
 mod table;
+mod towards;
 
 use std::f64::consts::PI;
 
@@ -22,6 +23,7 @@ pub use ggx::Ggx;
 pub use phong::Phong;
 pub use scatter::{Detail, Passing, Scatter};
 pub use specular::{Choices, Event, Specular, attenuated, mirrored};
+pub use towards::Towards;
 
 /// Lobes on patches are never more peaked than this α (roughness 0.2): a patch stores light by its area, and a lobe
 /// sharper than its neighbours are far apart would show as single bright cells. Lobes below half of this roughness
