@@ -26,7 +26,9 @@ const LOOK_BYTES_PER_PATCH: usize = 318;
 const LOOK_BYTES_PER_SEEN_PATCH: usize = 150;
 /// Bytes of a pixel while its picture is made and encoded, and of one that paths are traced for.
 const PICTURE_BYTES_PER_PIXEL: usize = 60;
-const PATH_BYTES_PER_PIXEL: usize = 120;
+const PATH_BYTES_PER_PIXEL: usize = 180;
+/// The same where neighbours share rays: sums, a copy of them, what was learnt of the lamps.
+const GATHER_BYTES_PER_PIXEL: usize = 420;
 /// The same for its layers: sums, what they become, and that as channels.
 const LAYER_BYTES_PER_PIXEL: usize = 200;
 /// What a thread keeps at hand: its stack as far as it is used, tasks of rays, the allocator's share.
@@ -58,6 +60,8 @@ pub struct PictureWork {
     pub samples: u32,
     /// Whether its pixels are traced, without a solve.
     pub is_traced: bool,
+    /// Whether its last bounce is traced, for which no observer is needed.
+    pub is_gathered: bool,
     /// Whether it has layers beside radiance.
     pub has_layers: bool,
 }
@@ -168,7 +172,7 @@ fn with(cut: &Estimate, [now, most_so_far]: [u64; 2], work: &Work, pixels: usize
             Rays::Total(n) => Some(n),
             Rays::PerPatch(n) => Some(n.saturating_mul(patches as u64)),
         };
-        let (glossy, observed) = (cut.glossy_patches, work.picture.is_some());
+        let (glossy, observed) = (cut.glossy_patches, work.picture.is_some_and(|p| !p.is_gathered));
         let demand = Demand { patches, glossy, observed, reflectance: cut.reflectance, rays };
         after =
             solving_bytes(params, &demand) + if work.writes_solution { WRITING_BYTES_PER_PATCH * patches } else { 0 };
@@ -184,6 +188,7 @@ fn with(cut: &Estimate, [now, most_so_far]: [u64; 2], work: &Work, pixels: usize
         let look = LOOK_BYTES_PER_PATCH * patches + LOOK_BYTES_PER_SEEN_PATCH * seen;
         after = match picture.is_traced {
             true => PATH_BYTES_PER_PIXEL * pixels,
+            false if picture.is_gathered => after.max(look + GATHER_BYTES_PER_PIXEL * pixels),
             false => after.max(look + PICTURE_BYTES_PER_PIXEL * pixels),
         };
         after += if picture.has_layers { LAYER_BYTES_PER_PIXEL * pixels } else { 0 };

@@ -8,6 +8,7 @@ mod embree;
 mod headline;
 mod kernel;
 pub mod memory;
+mod pictures;
 mod scaling;
 mod stages;
 mod strategies;
@@ -27,6 +28,7 @@ pub const PARTS: &[Part] = &[
     convergence::PART,
     strategies::PART,
     headline::PART,
+    pictures::PART,
     memory::PART,
 ];
 

@@ -49,9 +49,9 @@ pub(super) fn run(
     // --time and --error are the picture's: its solve is as long as it would be without, or a part of the time.
     let patches = loaded.patches.len();
     let goal = match (args.solve.rays, args.solve.time) {
-        (None, Some(seconds)) => Goal::First(solving::default_rays(patches), SOLVE_SHARE * seconds),
+        (None, Some(seconds)) => Goal::First(solving::rays_for_gather(patches), SOLVE_SHARE * seconds),
         (Some(rays), _) => Goal::Rays(rays),
-        (None, None) => Goal::Rays(solving::default_rays(patches)),
+        (None, None) => Goal::Rays(solving::rays_for_gather(patches)),
     };
     let Light { solution, settings, seconds, rate, interrupted } = light(args, loaded, None, goal)?;
     let balance = solution.balance();

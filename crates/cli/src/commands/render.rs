@@ -162,15 +162,15 @@ pub(super) fn light(args: &RenderArgs, loaded: &Loaded, camera: Option<&Camera>,
 
 /// What is to be done, for the estimate.
 fn work(args: &RenderArgs) -> Work {
-    let is_traced = args.method() == MethodArg::Path;
+    let (is_traced, is_gathered) = (args.method() == MethodArg::Path, args.method() == MethodArg::Gather);
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
-    let solve = if is_traced || stored::is_solution(&args.load.scene) {
-        Work::default()
-    } else {
-        solving::work(&args.solve, None)
+    let solve = match is_traced || stored::is_solution(&args.load.scene) {
+        true => Work::default(),
+        false if is_gathered => solving::work_for_gather(&args.solve),
+        false => solving::work(&args.solve, None),
     };
     let (size, has_layers) = (args.display.expected_size(args.size), !args.display.aov.is_empty());
-    Work { picture: Some(PictureWork { size, samples, is_traced, has_layers }), ..solve }
+    Work { picture: Some(PictureWork { size, samples, is_traced, is_gathered, has_layers }), ..solve }
 }
 
 pub(super) fn default_output(scene: &str) -> PathBuf {

@@ -15,6 +15,9 @@ use crate::stored::Stored;
 /// Rays per patch where the user does not say.
 const DEFAULT_RAYS_PER_PATCH: u64 = 400;
 
+/// The same where the picture gathers once more.
+const RAYS_PER_GATHERED_PATCH: u64 = 100;
+
 /// A solver that has gone as far as it should.
 pub struct Solved<'a> {
     /// It.
@@ -103,9 +106,19 @@ pub fn work(args: &SolveArgs, part: Option<[u32; 2]>) -> Work {
     Work { solve: Some((Settings::new(args, part).params(), rays)), ..Work::default() }
 }
 
-/// Rays where the user does not say.
-pub fn default_rays(patches: usize) -> u64 {
-    DEFAULT_RAYS_PER_PATCH * patches as u64
+/// Rays before a final gather where the user does not say: it averages over so many patches that more would not show.
+pub fn rays_for_gather(patches: usize) -> u64 {
+    RAYS_PER_GATHERED_PATCH * patches as u64
+}
+
+/// What is to be done before a final gather, for the estimate.
+pub fn work_for_gather(args: &SolveArgs) -> Work {
+    let rays = match (args.rays, args.time) {
+        (Some(n), _) => Rays::Total(n),
+        (None, None) => Rays::PerPatch(RAYS_PER_GATHERED_PATCH),
+        _ => Rays::Unknown,
+    };
+    Work { solve: Some((Settings::new(args, None).params(), rays)), ..Work::default() }
 }
 
 /// How far to go: as the user says, or some rays per patch. A part of several shoots its share of the rays, and leaves its share

@@ -7,18 +7,20 @@ use glam::DVec3;
 use twinray_scene::sample::PixelSample;
 
 use super::sample::Estimator;
-use super::tile::{PIXELS, SIDE, Tile};
+use super::tile::{PIXELS, SIDE, Tile, TilePixel};
 use crate::direct::Shadows;
 use crate::film::Crop;
 use crate::lights::{Choice, Lights};
 use crate::sums::{PixelSums, Seen};
 
-/// Tiles along a side of a block.
-pub(super) const TILES: usize = 4;
 /// Pixels along a side of a block.
-pub(super) const EDGE: usize = TILES * SIDE;
+pub(super) const EDGE: usize = 4 * SIDE;
 /// Camera rays of a batch.
 pub(super) const BATCH: u32 = 4;
+/// Places where tiles may lie against their block.
+const PLACES: u32 = (SIDE * SIDE) as u32;
+/// Offsets of tiles to the left and upwards, in an order that leaves no two alike neighbours.
+const OFFSETS: [usize; SIDE] = [0, 2, 1, 3];
 /// Shadow rays before a block trusts what it has learnt.
 const LESSONS: u64 = 512;
 /// The share of shadow rays that go by power all the same: what was overlooked is found.
@@ -38,6 +40,7 @@ pub(super) struct Block {
     /// Σ of the light that each lamp gave, and the number of shadow rays.
     given: Vec<f64>,
     lessons: u64,
+    batches: u32,
 }
 
 impl Block {
@@ -51,6 +54,7 @@ impl Block {
             sums: vec![PixelSums::default(); EDGE * EDGE],
             given: vec![0.0; lights.len()],
             lessons: 0,
+            batches: 0,
         }
     }
 
@@ -59,12 +63,17 @@ impl Block {
         &self.sums[(y - self.y) * EDGE + x - self.x]
     }
 
-    /// Shoots so many batches for each tile, `TILES` to a row.
+    /// Batches so far, the same for every pixel.
+    pub fn batches(&self) -> u32 {
+        self.batches
+    }
+
+    /// Shoots so many batches; `ray` gives a camera ray of a pixel.
     pub fn shoot(
         &mut self,
         estimator: &Estimator,
         seed: u64,
-        batches: impl Fn(usize, usize) -> u32,
+        batches: u32,
         ray: impl Fn(usize, usize, &mut PixelSample) -> Option<(DVec3, DVec3)>,
     ) {
         let learnt = self.learnt(&estimator.lights);
@@ -72,35 +81,50 @@ impl Block {
             Some(choice) => Shadows { choice, candidates: 1 },
             None => estimator.shadows(),
         };
-        let (width, window) = (self.width, self.window);
-        let tiles_in_row = width.div_ceil(SIDE) as u64;
-        let within = |at: usize, first: u32, count: u32| at >= first as usize && at < first as usize + count as usize;
-        for t in 0..TILES * TILES {
-            let (x0, y0) = (self.x + t % TILES * SIDE, self.y + t / TILES * SIDE);
-            let places: Vec<(usize, usize)> = (0..PIXELS)
-                .map(|slot| (x0 + slot % SIDE, y0 + slot / SIDE))
-                .filter(|&(x, y)| within(x, window.x, window.width) && within(y, window.y, window.height))
+        for _ in 0..batches {
+            self.batch(estimator, seed, shadows, &ray);
+            self.batches += 1;
+        }
+    }
+
+    /// One batch. Tiles lie elsewhere each time, or what neighbours share would show as squares.
+    fn batch(
+        &mut self,
+        estimator: &Estimator,
+        seed: u64,
+        shadows: Shadows,
+        ray: impl Fn(usize, usize, &mut PixelSample) -> Option<(DVec3, DVec3)>,
+    ) {
+        let place = (self.batches % PLACES) as usize;
+        let [left, above] = [place & 3, place >> 2].map(|k| OFFSETS[k]);
+        let tiles = EDGE / SIDE + 1;
+        for t in 0..tiles * tiles {
+            let (column, row) = (t % tiles, t / tiles);
+            let pixels: Vec<TilePixel> = (0..PIXELS)
+                .filter_map(|slot| {
+                    let x = (column * SIDE + slot % SIDE).checked_sub(left).filter(|x| *x < EDGE)? + self.x;
+                    let y = (row * SIDE + slot / SIDE).checked_sub(above).filter(|y| *y < EDGE)? + self.y;
+                    self.window.holds(x, y).then(|| TilePixel { x, y, number: (y * self.width + x) as u64, slot })
+                })
                 .collect();
-            let Some(&(first_x, first_y)) = places.first() else { continue };
-            let pixels: Vec<(u64, usize)> =
-                places.iter().map(|&(x, y)| ((y * width + x) as u64, (y - y0) * SIDE + x - x0)).collect();
-            let number = (y0 / SIDE) as u64 * tiles_in_row + (x0 / SIDE) as u64;
-            let tile = Tile { number, pixels: &pixels, seed };
-            for _ in 0..batches(x0 / SIDE, y0 / SIDE) {
-                let first = self.pixel(first_x, first_y).rays();
-                let mut seen = [Seen::default(); PIXELS];
-                for k in first..first.saturating_add(BATCH) {
-                    let (given, lessons) = (&mut self.given, &mut self.lessons);
-                    let learn = |lamp: usize, light: f64| {
-                        given[lamp] += light;
-                        *lessons += 1;
-                    };
-                    let ray = |n: usize, numbers: &mut _| ray(places[n].0, places[n].1, numbers);
-                    tile.sample(estimator, k, shadows, ray, &mut seen, learn);
-                }
-                for (&(x, y), seen) in places.iter().zip(&seen) {
-                    self.sums[(y - self.y) * EDGE + x - self.x].add(seen);
-                }
+            if pixels.is_empty() {
+                continue;
+            }
+            // Tiles in one place are a sequence of their own.
+            let number = ((self.y * self.width + self.x) as u64) << 16 | (place * tiles * tiles + t) as u64;
+            let tile = Tile { number, pixels: &pixels, seed, first: self.batches / PLACES * BATCH };
+            let mut seen = [Seen::default(); PIXELS];
+            for k in 0..BATCH {
+                let (given, lessons) = (&mut self.given, &mut self.lessons);
+                let learn = |lamp: usize, light: f64| {
+                    given[lamp] += light;
+                    *lessons += 1;
+                };
+                let ray = |p: &TilePixel, numbers: &mut _| ray(p.x, p.y, numbers);
+                tile.sample(estimator, self.batches * BATCH + k, k, shadows, ray, &mut seen, learn);
+            }
+            for (p, seen) in pixels.iter().zip(&seen) {
+                self.sums[(p.y - self.y) * EDGE + p.x - self.x].add(seen);
             }
         }
     }

@@ -6,7 +6,7 @@
 //! patches to look even, its end is a point like the first. No patch is seen directly: shadows and textures are sharp,
 //! and only light of two bounces and more is as smooth as patches are.
 //! `sample` follows one camera ray; `tile` lets neighbours share what their gather rays find; `block` is the work of one
-//! task and learns which lamps matter there; `pass` decides how many rays each tile gets.
+//! task and learns which lamps matter there; `pass` decides how many rays each block gets.
 
 mod block;
 mod pass;
@@ -21,7 +21,6 @@ use crate::picture::Picture;
 use crate::sums::{self, PixelSums};
 use block::{Block, EDGE};
 use sample::Estimator;
-use tile::SIDE;
 
 /// Settings of a gather.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +62,7 @@ impl<'a> Gather<'a> {
     pub fn new(scene: &'a PatchScene, solution: &'a Solution, camera: &Camera, options: &GatherOptions) -> Self {
         let film = Film::new(options.width, options.height, options.crop);
         let estimator = Estimator::new(scene, solution);
-        let grid = Grid::new(&film.window, EDGE);
+        let grid = Grid::new(&film.window);
         let blocks = (0..grid.rows)
             .flat_map(|row| (0..grid.columns).map(move |column| (column, row)))
             .map(|(column, row)| {
@@ -121,14 +120,14 @@ impl<'a> Gather<'a> {
         self.film.len()
     }
 
-    /// Tiles of the window.
-    fn tiles(&self) -> Grid {
-        Grid::new(&self.film.window, SIDE)
+    /// Blocks of the window.
+    fn grid(&self) -> Grid {
+        Grid::new(&self.film.window)
     }
 
     /// Sums of a pixel of the whole film that is in the window.
     fn pixel(&self, x: usize, y: usize) -> &PixelSums {
-        let grid = Grid::new(&self.film.window, EDGE);
+        let grid = self.grid();
         self.blocks[grid.index(x / EDGE, y / EDGE)].pixel(x, y)
     }
 
@@ -139,10 +138,10 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// Squares of the whole film that have a part in a window.
+/// Blocks of the whole film that have a part in a window.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
-    /// First column and row, in squares of the whole film.
+    /// First column and row, in blocks of the whole film.
     column: usize,
     row: usize,
     columns: usize,
@@ -150,16 +149,16 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(window: &Crop, edge: usize) -> Self {
+    fn new(window: &Crop) -> Self {
         let range = |first: u32, count: u32| {
             let (first, end) = (first as usize, first as usize + count as usize);
-            (first / edge, end.div_ceil(edge) - first / edge)
+            (first / EDGE, end.div_ceil(EDGE) - first / EDGE)
         };
         let ((column, columns), (row, rows)) = (range(window.x, window.width), range(window.y, window.height));
         Self { column, row, columns, rows }
     }
 
-    /// Number in the window of a square of the whole film, row by row.
+    /// Number in the window of a block of the whole film, row by row.
     fn index(&self, column: usize, row: usize) -> usize {
         (row - self.row) * self.columns + column - self.column
     }

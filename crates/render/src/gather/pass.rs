@@ -1,27 +1,26 @@
-//! How many camera rays each tile gets.
+//! How many camera rays each block gets.
 //!
-//! After the first passes a tile's share follows its noise: for the least mean square of relative errors, rays go
-//! ∝ σ/(L + ε) (Neyman's allocation). Noise is that of the tile and its neighbours together, so that none stops early
+//! After the first passes a block's share follows its noise: for the least mean square of relative errors, rays go
+//! ∝ σ/(L + ε) (Neyman's allocation). Noise is that of the block and its neighbours together, so that none stops early
 //! because it happened to look even.
 
 use rayon::prelude::*;
 use twinray_scene::sample::PixelSample;
 
 use super::block::{BATCH, Block};
-use super::tile::SIDE;
 use super::{Gather, Grid};
 use crate::film::tent;
 
-/// Batches of every tile before noise decides.
+/// Batches of every block before noise decides.
 const FIRST: u64 = 2;
-/// The most batches of a tile over those of the mean.
+/// The most batches of a block over those of the mean.
 const MOST: f64 = 16.0;
 /// The least.
 const LEAST: f64 = 0.25;
-/// Of the mean luminance, what is added to a tile's where errors are relative.
+/// Of the mean luminance, what is added to a block's where errors are relative.
 const DARK: f64 = 0.05;
 
-/// What is known of a tile.
+/// What is known of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
     pixels: f64,
@@ -29,6 +28,19 @@ struct Known {
     /// Variance of a batch's mean.
     variance: f64,
     batches: f64,
+}
+
+impl Known {
+    fn of(block: &Block) -> Self {
+        let wanted = || block.sums.iter().filter(|p| p.rays() > 0);
+        let pixels = wanted().count() as f64;
+        Self {
+            pixels,
+            luminance: wanted().map(|p| p.radiance().luminance()).sum::<f64>() / pixels,
+            variance: wanted().map(|p| p.variance_of_batch()).sum::<f64>() / pixels,
+            batches: f64::from(block.batches()),
+        }
+    }
 }
 
 impl Gather<'_> {
@@ -40,7 +52,7 @@ impl Gather<'_> {
         let wished = (samples / f64::from(BATCH)).max(1.0);
         let done = per_pixel(self.rays);
         if done < FIRST as f64 || !self.adaptive {
-            // Whole passes over all tiles.
+            // Whole passes over all blocks.
             let even = if self.adaptive { wished.min(FIRST as f64) } else { wished };
             // One at a time: blocks learn from each.
             for _ in 0..(even - done).ceil().max(0.0) as u64 {
@@ -50,14 +62,14 @@ impl Gather<'_> {
         let done = per_pixel(self.rays);
         if self.adaptive && done < wished {
             let plan = self.plan((wished - done) * pixels);
-            self.pass(&|tile| plan[tile]);
+            self.pass(&|block| plan[block]);
         }
     }
 
-    /// Batches for every tile, about `budget` batches of pixels in all.
+    /// Batches for every block, about `budget` batches of pixels in all.
     fn plan(&self, budget: f64) -> Vec<u32> {
-        let Grid { columns, rows, .. } = self.tiles();
-        let known: Vec<Known> = (0..columns * rows).into_par_iter().map(|t| self.known(t)).collect();
+        let Grid { columns, rows, .. } = self.grid();
+        let known: Vec<Known> = self.blocks.par_iter().map(Known::of).collect();
         let total_pixels: f64 = known.iter().map(|k| k.pixels).sum();
         let mean = known.iter().map(|k| k.pixels * k.luminance).sum::<f64>() / total_pixels.max(1.0);
         let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
@@ -95,39 +107,16 @@ impl Gather<'_> {
             .collect()
     }
 
-    /// What is known of a tile.
-    fn known(&self, tile: usize) -> Known {
-        let (grid, window) = (self.tiles(), &self.film.window);
-        let pixels = |square: usize, first: u32, count: u32| {
-            let (first, end) = (first as usize, (first + count) as usize);
-            (square * SIDE).max(first)..((square + 1) * SIDE).min(end)
-        };
-        let mut known = Known::default();
-        for y in pixels(grid.row + tile / grid.columns, window.y, window.height) {
-            for x in pixels(grid.column + tile % grid.columns, window.x, window.width) {
-                let p = self.pixel(x, y);
-                known.pixels += 1.0;
-                known.luminance += p.radiance().luminance();
-                known.variance += p.variance_of_batch();
-                known.batches = f64::from(p.rays() / BATCH);
-            }
-        }
-        known.luminance /= known.pixels;
-        known.variance /= known.pixels;
-        known
-    }
-
-    /// Shoots so many batches for every tile.
+    /// Shoots so many batches for every block.
     fn pass(&mut self, batches: &(dyn Fn(usize) -> u32 + Sync)) {
-        let grid = self.tiles();
         let Self { estimator, camera, film, seed, blocks, .. } = self;
-        blocks.par_iter_mut().for_each(|block: &mut Block| {
+        blocks.par_iter_mut().enumerate().for_each(|(number, block)| {
             let ray = |x: usize, y: usize, numbers: &mut PixelSample| {
                 let (place, lens) = (numbers.pair().map(tent), numbers.pair());
                 film.ray(camera, [x as u32, y as u32], place, lens)
             };
-            block.shoot(estimator, *seed, |column, row| batches(grid.index(column, row)), ray);
+            block.shoot(estimator, *seed, batches(number), ray);
         });
-        self.rays = self.pixels().iter().map(|p| u64::from(p.rays())).sum();
+        self.rays = self.blocks.iter().flat_map(|b| &b.sums).map(|p| u64::from(p.rays())).sum();
     }
 }

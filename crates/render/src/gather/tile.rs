@@ -37,30 +37,43 @@ struct Work {
 
 /// The pixels of a tile: their rays, and where sums go.
 pub(super) struct Tile<'t> {
-    /// Number of the tile on the whole film.
+    /// A number of its own.
     pub number: u64,
-    /// Number of every pixel on the whole film, and its slot in the tile.
-    pub pixels: &'t [(u64, usize)],
+    pub pixels: &'t [TilePixel],
     pub seed: u64,
+    /// Samples that tiles in this place had before.
+    pub first: u32,
+}
+
+/// A pixel of a tile.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TilePixel {
+    /// Column and row on the whole film, and their number there.
+    pub x: usize,
+    pub y: usize,
+    pub number: u64,
+    /// Its place in the tile.
+    pub slot: usize,
 }
 
 impl Tile<'_> {
-    /// Sample `k` of every pixel: `ray` gives a camera ray of the world. Adds to `seen`; `learn` is told what which
-    /// lamp gave.
+    /// Sample `sample` of every pixel, the tile's own after `first` being number `k`: `ray` gives a camera ray of the world.
+    /// Adds to `seen`; `learn` is told what which lamp gave.
     pub fn sample(
         &self,
         estimator: &Estimator,
+        sample: u32,
         k: u32,
         shadows: Shadows,
-        ray: impl Fn(usize, &mut PixelSample) -> Option<(DVec3, DVec3)>,
+        ray: impl Fn(&TilePixel, &mut PixelSample) -> Option<(DVec3, DVec3)>,
         seen: &mut [Seen],
         mut learn: impl FnMut(usize, f64),
     ) {
         let mut work = [Work::default(); PIXELS];
-        for (n, &(pixel, slot)) in self.pixels.iter().enumerate() {
-            let mut numbers = PixelSample::new(self.seed, pixel, k);
+        for (n, pixel) in self.pixels.iter().enumerate() {
+            let mut numbers = PixelSample::new(self.seed, pixel.number, sample);
             // Where the camera sees nothing, as beyond a fisheye's circle, the pixel stays black.
-            let Some((origin, direction)) = ray(n, &mut numbers) else { continue };
+            let Some((origin, direction)) = ray(pixel, &mut numbers) else { continue };
             let work = &mut work[n];
             work.sight = estimator.look(origin, direction, &mut numbers);
             let Some(point) = &work.sight.point else { continue };
@@ -69,7 +82,7 @@ impl Tile<'_> {
             if let Some(lamp) = lamp {
                 learn(lamp, light.luminance());
             }
-            let u = net_point(mix(self.seed ^ mix(self.number ^ 0x7113_5EED)), dealt(k, slot));
+            let u = net_point(mix(self.seed ^ mix(self.number ^ 0x7113_5EED)), dealt(self.first + k, pixel.slot));
             work.gathered = estimator.gather(point, u, shadows, &mut numbers);
         }
         self.share(&mut work);
