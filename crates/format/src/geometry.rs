@@ -95,7 +95,8 @@ fn drop_unused_vertices(mesh: &mut Mesh) {
     }
     keep(&mut mesh.positions, &used);
     mesh.normals.iter_mut().for_each(|n| keep(n, &used));
-    mesh.texcoords.iter_mut().for_each(|t| keep(t, &used));
+    mesh.tangents.iter_mut().for_each(|t| keep(t, &used));
+    mesh.texcoords.iter_mut().chain(&mut mesh.second_texcoords).for_each(|t| keep(t, &used));
 }
 
 /// Replaces normals without direction by the geometric ones around the vertex, and damaged texture coordinates
@@ -119,14 +120,20 @@ fn mend_attributes(context: &mut Context<'_>, mesh: &mut Mesh, element: &str) {
             context.warn(element, format!("{bad} normals have no direction; the triangles around them give it"));
         }
     }
-    if let Some(texcoords) = &mut mesh.texcoords {
-        let damaged: Vec<_> = texcoords.iter_mut().filter(|t| t.iter().any(|c| !c.is_finite())).collect();
-        if !damaged.is_empty() {
-            let count = damaged.len();
-            damaged.into_iter().for_each(|t| *t = [0.0; 2]);
-            context.warn(element, format!("{count} texture coordinates are not numbers; taken as 0"));
+    let mut mend = |count: usize, what: &str| {
+        if count > 0 {
+            context.warn(element, format!("{count} {what} are not numbers; taken as 0"));
         }
-    }
+    };
+    let texcoords = mesh.texcoords.iter_mut().chain(&mut mesh.second_texcoords).flatten();
+    mend(without_damage(texcoords), "texture coordinates");
+    mend(without_damage(mesh.tangents.iter_mut().flatten()), "tangents");
+}
+
+/// Puts zeros where a number is none; answers how many elements were damaged.
+fn without_damage<'a, const N: usize>(values: impl Iterator<Item = &'a mut [f32; N]>) -> usize {
+    let damaged = values.filter(|v| v.iter().any(|c| !c.is_finite()));
+    damaged.map(|v| *v = [0.0; N]).count()
 }
 
 /// Counts triangles as they are placed in the world.
@@ -181,8 +188,15 @@ pub(crate) fn check_triangles(context: &Context<'_>, element: &str, triangles: u
     })
 }
 
-/// Memory of the arrays of `mesh`, for the budget.
-pub(crate) fn mesh_bytes(vertices: usize, triangles: usize, normals: bool, texcoords: bool) -> u64 {
-    let vertex = 12 + 12 * u64::from(normals) + 8 * u64::from(texcoords);
+/// Memory of the arrays of a mesh whose vertices take `vertex` bytes each, for the budget.
+pub(crate) fn mesh_bytes(vertices: usize, triangles: usize, vertex: u64) -> u64 {
     vertices as u64 * vertex + triangles as u64 * 12
 }
+
+/// Memory of a vertex: its position, and whichever it has of a normal, a tangent and texture coordinates.
+pub(crate) fn vertex_bytes(normal: bool, tangent: bool, texcoords: usize) -> u64 {
+    12 + 12 * u64::from(normal) + 16 * u64::from(tangent) + 8 * texcoords as u64
+}
+
+/// Memory of a vertex that has everything.
+pub(crate) const RICHEST_VERTEX: u64 = 12 + 12 + 16 + 2 * 8;

@@ -50,6 +50,27 @@ impl Pictures {
         Ok((self.images.len() - 1, remark))
     }
 
+    /// A picture made texel by texel of picture `index`, within the same limits; `None` beyond them.
+    pub(crate) fn derive(
+        &mut self,
+        index: usize,
+        prefix: &str,
+        limits: &Limits,
+        texel: impl Fn([u8; 4]) -> [u8; 4],
+    ) -> Option<usize> {
+        let source = self.images.get(index)?.clone();
+        let texels = u64::from(source.width) * u64::from(source.height);
+        if texels > limits.max_texels.saturating_sub(self.texels) {
+            return None;
+        }
+        self.texels += texels;
+        let rgba = source.rgba.as_chunks::<4>().0.iter().flat_map(|t| texel(*t)).collect();
+        let image = TextureImage { name: format!("{prefix}{}", source.name), rgba, ..*source };
+        self.brightest.push(brightest_texel(&image));
+        self.images.push(Arc::new(image));
+        Some(self.images.len() - 1)
+    }
+
     /// Largest linear value of each channel of picture `index`.
     pub(crate) fn brightest(&self, index: usize) -> [f64; 3] {
         self.brightest.get(index).copied().unwrap_or([1.0; 3])

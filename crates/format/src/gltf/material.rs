@@ -1,22 +1,38 @@
-//! glTF materials and textures to ours. No fault here ends the reading: each is a warning with what was used
-//! instead.
+//! glTF materials to ours. No fault here ends the reading: each is a warning with what was used instead.
 //!
 //! Emission is that of the front side, `emissiveFactor` × `KHR_materials_emissive_strength` × texture, also where
 //! the material is double-sided: a lamp that also shone backwards would give twice the light its author set.
-//! Not here: pixels (`texture`), the limit of reflectance (`reflectance`).
+//! Not here: what a slot for a texture says (`slot`), pixels (`texture`), the limit of reflectance (`reflectance`).
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
-use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Transmission, Wrap};
+use twinray_scene::{Material, NormalMap, Opacity, Rgb, Surface, Texel, TextureRef, Transmission, Volume};
 
 use super::container::Buffers;
 use super::json::Element;
 use crate::context::Context;
 use crate::error::FormatError;
-use crate::reference::{data_uri, percent_decode};
 use crate::reflectance::Clamp;
 use crate::texture::Pictures;
 use crate::warning::name_list;
+
+/// Extensions of materials that change how they look and are not read; each gets one warning with the materials.
+pub(super) const IGNORED: [&str; 8] = [
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_unlit",
+    "KHR_materials_volume_scatter",
+];
+
+/// What passes a length of the attenuation distance at least: a channel of 0 would have no coefficient.
+const DARKEST: f64 = 1e-6;
+
+/// The largest coefficient of attenuation, 1/m: light ends within a nanometre.
+const DENSEST: f64 = 1e10;
 
 /// Reads materials when they are first used.
 #[derive(Default)]
@@ -24,12 +40,13 @@ pub(super) struct Materials {
     list: Vec<Material>,
     /// By index in the file; `None` is glTF's default material.
     known: HashMap<Option<usize>, usize>,
-    pictures: Pictures,
+    pub(super) pictures: Pictures,
     /// Picture of each image of the file, `None` if it cannot be used.
-    images: HashMap<usize, Option<usize>>,
+    pub(super) images: HashMap<usize, Option<usize>>,
     clamp: Clamp,
-    transmissive: Vec<String>,
-    unread_maps: Vec<String>,
+    occluded: Vec<String>,
+    converted: Vec<String>,
+    ignored: BTreeMap<&'static str, Vec<String>>,
 }
 
 impl Materials {
@@ -66,18 +83,21 @@ impl Materials {
                 context.sum_up("materials", format!("{message}: {}", name_list(names)));
             }
         };
-        report(&self.transmissive, "transmission lets light straight through, without refraction or tint");
-        report(&self.unread_maps, "maps that are not read (normal, occlusion, specular, transmission)");
+        report(&self.occluded, "occlusion maps are ignored, since light finds the corners itself");
+        report(&self.converted, "KHR_materials_pbrSpecularGlossiness is read as the lobe of the same reflectance");
+        for (extension, names) in &self.ignored {
+            report(names, &format!("{extension} is ignored"));
+        }
         (self.list, self.pictures)
     }
 }
 
 /// One material at work.
-struct Reader<'r, 'c> {
-    context: &'r mut Context<'c>,
-    root: &'r Element<'r>,
-    buffers: &'r Buffers<'r>,
-    materials: &'r mut Materials,
+pub(super) struct Reader<'r, 'c> {
+    pub(super) context: &'r mut Context<'c>,
+    pub(super) root: &'r Element<'r>,
+    pub(super) buffers: &'r Buffers<'r>,
+    pub(super) materials: &'r mut Materials,
 }
 
 impl Reader<'_, '_> {
@@ -85,41 +105,12 @@ impl Reader<'_, '_> {
         let empty = serde_json::Value::Null;
         let nothing = Element::root(self.context.file, &empty);
         let element = element.unwrap_or(&nothing);
-        let pbr = element.get("pbrMetallicRoughness").unwrap_or_else(|| nothing.clone());
-
-        let color = self.colour(&pbr, "baseColorFactor", [1.0; 4], 1.0);
-        let mut base_color = Texel {
-            factor: Rgb::new(color[0], color[1], color[2]),
-            alpha: color[3],
-            texture: self.texture(pbr.get("baseColorTexture")),
-        };
-        let limit = self.context.limits.max_reflectance;
-        self.materials.clamp.apply(&mut base_color, &self.materials.pictures, limit, &name);
-
-        let metallic = self.number(&pbr, "metallicFactor", 1.0, 0.0..=1.0);
-        let roughness = self.number(&pbr, "roughnessFactor", 1.0, 0.0..=1.0);
-        let (specular, specular_color) = match element.extension("KHR_materials_specular") {
-            Some(e) => {
-                let color = self.colour(&e, "specularColorFactor", [1.0; 3], f64::MAX);
-                (self.number(&e, "specularFactor", 1.0, 0.0..=1.0), Rgb::from_array(color))
-            }
-            None => (1.0, Rgb::WHITE),
-        };
-        let surface = if specular == 0.0 && metallic == 0.0 {
-            Surface::Lambertian { reflectance: base_color }
-        } else {
-            let metallic_roughness_texture = self.texture(pbr.get("metallicRoughnessTexture"));
-            let ior = self.ior(element);
-            Surface::MetallicRoughness {
-                base_color,
-                metallic,
-                roughness,
-                metallic_roughness_texture,
-                specular,
-                specular_texture: None,
-                specular_color,
-                specular_color_texture: None,
-                ior,
+        let transmission = self.transmission(element);
+        let surface = match element.extension("KHR_materials_pbrSpecularGlossiness") {
+            Some(extension) => self.specular_glossiness(&extension, &name),
+            None => {
+                let pbr = element.get("pbrMetallicRoughness").unwrap_or_else(|| nothing.clone());
+                self.metallic_roughness(element, &pbr, &name, transmission.is_some())
             }
         };
 
@@ -129,13 +120,103 @@ impl Reader<'_, '_> {
         let emission = self.emission(element, Rgb::from_array(emissive) * strength);
         // The texture of a black emitter would be decoded for nothing.
         let emission_texture = if emission.is_black() { None } else { self.texture(element.get("emissiveTexture")) };
-        let transmissive = self.transmits(element);
-        self.note_unread(element, transmissive, &name);
+        let normal_map = self.normal_map(element);
+        self.note_ignored(element, &name);
         let opacity = self.opacity(element);
         let two_sided = element.flag("doubleSided");
-        let transmission = transmissive.then_some(Transmission { factor: 1.0, texture: None, volume: None });
-        let normal_map = None;
         Material { name, surface, emission, emission_texture, two_sided, opacity, transmission, normal_map }
+    }
+
+    fn metallic_roughness(&mut self, element: &Element<'_>, pbr: &Element<'_>, name: &str, transmits: bool) -> Surface {
+        let base_color = self.base_color(pbr, ["baseColorFactor", "baseColorTexture"], name);
+        let metallic = self.number(pbr, "metallicFactor", 1.0, 0.0..=1.0);
+        let roughness = self.number(pbr, "roughnessFactor", 1.0, 0.0..=1.0);
+        let extension = element.extension("KHR_materials_specular");
+        let (specular, specular_color) = match &extension {
+            Some(e) => {
+                let color = self.colour(e, "specularColorFactor", [1.0; 3], f64::MAX);
+                (self.number(e, "specularFactor", 1.0, 0.0..=1.0), Rgb::from_array(color))
+            }
+            None => (1.0, Rgb::WHITE),
+        };
+        if let Some(phong) = self.phong(element, &base_color, roughness, specular_color) {
+            return phong;
+        }
+        // Where light passes, roughness means something without a lobe, too.
+        if specular == 0.0 && metallic == 0.0 && (!transmits || roughness == 0.0) {
+            return Surface::Lambertian { reflectance: base_color };
+        }
+        Surface::MetallicRoughness {
+            base_color,
+            metallic,
+            roughness,
+            metallic_roughness_texture: self.texture(pbr.get("metallicRoughnessTexture")),
+            specular,
+            specular_texture: self.texture(extension.as_ref().and_then(|e| e.get("specularTexture"))),
+            specular_color,
+            specular_color_texture: self.texture(extension.as_ref().and_then(|e| e.get("specularColorTexture"))),
+            ior: self.ior(element),
+        }
+    }
+
+    /// Factor and texture of a base colour, below the limit of reflectance.
+    fn base_color(&mut self, owner: &Element<'_>, [factor, texture]: [&str; 2], name: &str) -> Texel {
+        let color = self.colour(owner, factor, [1.0; 4], 1.0);
+        let mut texel = Texel {
+            factor: Rgb::new(color[0], color[1], color[2]),
+            alpha: color[3],
+            texture: self.texture(owner.get(texture)),
+        };
+        let limit = self.context.limits.max_reflectance;
+        self.materials.clamp.apply(&mut texel, &self.materials.pictures, limit, name);
+        texel
+    }
+
+    /// The older way to say what reflects: colour of the base, colour of the lobe, glossiness (1 − roughness). An index
+    /// of refraction of 0 makes the lobe's colour its reflectance at normal incidence, and the base gets what is left,
+    /// as that extension has it.
+    fn specular_glossiness(&mut self, extension: &Element<'_>, name: &str) -> Surface {
+        self.materials.converted.push(name.to_owned());
+        let base_color = self.base_color(extension, ["diffuseFactor", "diffuseTexture"], name);
+        let specular = Rgb::from_array(self.colour(extension, "specularFactor", [1.0; 3], 1.0));
+        let glossiness = self.number(extension, "glossinessFactor", 1.0, 0.0..=1.0);
+        let texture = self.texture(extension.get("specularGlossinessTexture"));
+        let mut lobe = Texel { texture, ..Texel::constant(specular) };
+        let limit = self.context.limits.max_reflectance;
+        self.materials.clamp.apply(&mut lobe, &self.materials.pictures, limit, name);
+        // Glossiness is in the alpha channel; roughness has to be in a green one.
+        let rough = |[_, _, _, alpha]: [u8; 4]| {
+            let roughness = 255.0 - glossiness * f64::from(alpha);
+            [0, roughness.round() as u8, 0, 255]
+        };
+        let (pictures, limits) = (&mut self.materials.pictures, self.context.limits);
+        let derived = lobe.texture.as_ref().and_then(|t| {
+            let image = pictures.derive(t.image, "roughness of ", limits, rough)?;
+            Some(TextureRef { image, ..t.clone() })
+        });
+        Surface::MetallicRoughness {
+            base_color,
+            metallic: 0.0,
+            roughness: if derived.is_some() { 1.0 } else { 1.0 - glossiness },
+            metallic_roughness_texture: derived,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: lobe.factor,
+            specular_color_texture: lobe.texture,
+            ior: 0.0,
+        }
+    }
+
+    /// What `write_glb` notes of a Phong lobe, as long as the lobe that stands beside it is still the one it wrote.
+    fn phong(&self, element: &Element<'_>, diffuse: &Texel, roughness: f64, color: Rgb) -> Option<Surface> {
+        let noted = element.get("extras")?.get("twinray_phong")?;
+        let specular = Rgb::from_array(noted.numbers("specular").ok()??);
+        let exponent = noted.number("exponent").ok()??;
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + b.abs());
+        let [wanted_roughness, wanted_color] = [super::write::phong_roughness(exponent), 1.0 / super::write::PHONG_F0];
+        let same = close(roughness, wanted_roughness) && (0..3).all(|c| close(color[c], specular[c] * wanted_color));
+        let room = specular.min_channel() >= 0.0 && (diffuse.factor + specular).max_channel() <= 1.0;
+        (same && room && exponent >= 0.0).then(|| Surface::Phong { diffuse: diffuse.clone(), specular, exponent })
     }
 
     /// `emission` within the limits; a factor times a strength may also be no number at all.
@@ -173,22 +254,45 @@ impl Reader<'_, '_> {
         }
     }
 
-    fn transmits(&mut self, element: &Element<'_>) -> bool {
-        let Some(extension) = element.extension("KHR_materials_transmission") else { return false };
-        self.number(&extension, "transmissionFactor", 0.0, 0.0..=1.0) > 0.0
+    fn transmission(&mut self, element: &Element<'_>) -> Option<Transmission> {
+        let extension = element.extension("KHR_materials_transmission")?;
+        let factor = self.number(&extension, "transmissionFactor", 0.0, 0.0..=1.0);
+        if factor == 0.0 {
+            return None;
+        }
+        let texture = self.texture(extension.get("transmissionTexture"));
+        Some(Transmission { factor, texture, volume: self.volume(element) })
     }
 
-    fn note_unread(&mut self, element: &Element<'_>, transmissive: bool, name: &str) {
-        if transmissive {
-            self.materials.transmissive.push(name.to_owned());
+    /// What the surface encloses. The thickness itself is for those who do not trace rays: only whether it is 0 counts.
+    fn volume(&mut self, element: &Element<'_>) -> Option<Volume> {
+        let extension = element.extension("KHR_materials_volume")?;
+        if self.number(&extension, "thicknessFactor", 0.0, 0.0..=f64::MAX) == 0.0 {
+            return None;
         }
-        let specular = element.extension("KHR_materials_specular");
-        let unread = element.get("normalTexture").is_some()
-            || element.get("occlusionTexture").is_some()
-            || specular.is_some_and(|s| s.get("specularTexture").or(s.get("specularColorTexture")).is_some())
-            || element.extension("KHR_materials_transmission").is_some_and(|t| t.get("transmissionTexture").is_some());
-        if unread {
-            self.materials.unread_maps.push(name.to_owned());
+        let color = self.colour(&extension, "attenuationColor", [1.0; 3], 1.0);
+        let distance = self.number(&extension, "attenuationDistance", f64::INFINITY, 0.0..=f64::INFINITY);
+        if distance == 0.0 {
+            self.context.warn(format!("{}.attenuationDistance", extension.path), "0 is no distance; ignored");
+            return Some(Volume { attenuation: Rgb::BLACK });
+        }
+        let coefficient = |c: f64| (-c.max(DARKEST).ln() / distance).clamp(0.0, DENSEST);
+        Some(Volume { attenuation: Rgb::from_array(color.map(coefficient)) })
+    }
+
+    fn normal_map(&mut self, element: &Element<'_>) -> Option<NormalMap> {
+        let slot = element.get("normalTexture")?;
+        let scale = self.number(&slot, "scale", 1.0, f64::MIN..=f64::MAX);
+        let texture = self.texture(Some(slot))?;
+        Some(NormalMap { texture, scale })
+    }
+
+    fn note_ignored(&mut self, element: &Element<'_>, name: &str) {
+        if element.get("occlusionTexture").is_some() {
+            self.materials.occluded.push(name.to_owned());
+        }
+        for extension in IGNORED.into_iter().filter(|e| element.extension(e).is_some()) {
+            self.materials.ignored.entry(extension).or_default().push(name.to_owned());
         }
     }
 
@@ -221,91 +325,5 @@ impl Reader<'_, '_> {
     fn replaced<T: std::fmt::Debug>(&mut self, element: &str, error: &FormatError, default: T) -> T {
         self.context.warn(element, format!("{}; {default:?} is used", error.without_place()));
         default
-    }
-
-    /// The texture of a slot. Whatever is wrong with it, the factor stands alone.
-    fn texture(&mut self, slot: Option<Element<'_>>) -> Option<TextureRef> {
-        let slot = slot?;
-        match self.try_texture(&slot) {
-            Ok(texture) => texture,
-            Err(error) => {
-                self.context.warn(&slot.path, format!("{}: the factor is used alone", error.without_place()));
-                None
-            }
-        }
-    }
-
-    fn try_texture(&mut self, slot: &Element<'_>) -> Result<Option<TextureRef>, FormatError> {
-        let transform = slot.extension("KHR_texture_transform");
-        let moved = transform.as_ref().map(|t| t.integer("texCoord")).transpose()?.flatten();
-        let set = moved.or(slot.integer("texCoord")?).unwrap_or(0);
-        if set != 0 {
-            let message = format!("uses TEXCOORD_{set}; only TEXCOORD_0 is read: the factor is used alone");
-            self.context.warn(&slot.path, message);
-            return Ok(None);
-        }
-        if transform.is_some_and(|t| t.keys().any(|k| matches!(k, "offset" | "scale" | "rotation"))) {
-            self.context.warn(&slot.path, "KHR_texture_transform is ignored: the picture lies differently");
-        }
-        let link = slot.require("index", "the index of a texture")?;
-        let (_, texture) = link.as_link(self.root, "textures")?;
-        let webp = texture.extension("EXT_texture_webp");
-        let source = webp.as_ref().filter(|w| w.get("source").is_some()).unwrap_or(&texture);
-        let Some((index, image)) = source.follow("source", self.root, "images")? else {
-            return Err(texture.fault("no source", "the index of an image"));
-        };
-        let Some(picture) = self.picture(index, &image) else { return Ok(None) };
-        let sampler = texture.follow("sampler", self.root, "samplers")?.map(|(_, s)| s);
-        let (mut wrap, mut nearest) = ([Wrap::Repeat; 2], false);
-        if let Some(sampler) = sampler {
-            wrap = [wrap_mode(&sampler, "wrapS"), wrap_mode(&sampler, "wrapT")];
-            nearest = matches!(sampler.integer("magFilter"), Ok(Some(9728)));
-        }
-        Ok(Some(TextureRef { wrap, nearest, ..TextureRef::of(picture) }))
-    }
-
-    /// Our index of image `index` of the file, decoded when first asked for.
-    fn picture(&mut self, index: usize, image: &Element<'_>) -> Option<usize> {
-        if let Some(known) = self.materials.images.get(&index) {
-            return *known;
-        }
-        let picture = match self.decode(index, image) {
-            Ok((picture, remark)) => {
-                remark.into_iter().for_each(|r| self.context.warn(&image.path, r));
-                Some(picture)
-            }
-            Err(message) => {
-                let message = format!("{message}: materials that use it keep their factor alone");
-                self.context.warn(&image.path, message);
-                None
-            }
-        };
-        self.materials.images.insert(index, picture);
-        picture
-    }
-
-    fn decode(&mut self, index: usize, image: &Element<'_>) -> Result<(usize, Option<String>), String> {
-        let words = |error: FormatError| error.without_place();
-        let (pictures, limits) = (&mut self.materials.pictures, self.context.limits);
-        if let Some(view) = self.buffers.view(self.root, image).map_err(words)? {
-            return pictures.add(&image.name_or(|| format!("image {index}")), view.bytes, limits);
-        }
-        let uri = image.text("uri").map_err(words)?.ok_or("has neither uri nor bufferView")?;
-        match data_uri(uri) {
-            Some(bytes) => pictures.add(&image.name_or(|| format!("image {index}")), &bytes?, limits),
-            None => {
-                let path = percent_decode(uri);
-                let bytes = self.context.fetch(&image.path, &path).map_err(words)?;
-                pictures.add(&path, &bytes, limits)
-            }
-        }
-    }
-}
-
-fn wrap_mode(sampler: &Element<'_>, key: &str) -> Wrap {
-    match sampler.integer(key) {
-        Ok(Some(33071)) => Wrap::Clamp,
-        Ok(Some(33648)) => Wrap::Mirror,
-        _ => Wrap::Repeat,
     }
 }

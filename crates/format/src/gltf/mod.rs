@@ -9,6 +9,7 @@ mod json;
 mod material;
 mod node;
 mod primitive;
+mod slot;
 mod write;
 
 use std::collections::HashMap;
@@ -18,24 +19,26 @@ use twinray_scene::{Environment, Instance, Mesh, Rgb, Scene};
 
 use self::container::Buffers;
 use self::json::Element;
-use self::material::Materials;
+use self::material::{IGNORED, Materials};
 use self::node::Placed;
 use self::primitive::Primitives;
 use crate::context::Context;
 use crate::error::FormatError;
-use crate::geometry::{Account, clean, mesh_bytes, no_triangles};
+use crate::geometry::{Account, RICHEST_VERTEX, clean, mesh_bytes, no_triangles};
 use crate::warning::name_list;
 
 pub use self::write::write_glb;
 
 /// Extensions that are read, or whose absence from the result is named where it shows.
-const UNDERSTOOD: [&str; 8] = [
+const UNDERSTOOD: [&str; 10] = [
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_transmission",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
@@ -154,10 +157,10 @@ impl Content<'_, '_> {
             return Ok(Some((mesh, to_world)));
         }
         let source = &self.scene.meshes[mesh];
-        let bytes = mesh_bytes(source.positions.len(), source.triangles.len(), true, true);
+        let bytes = mesh_bytes(source.positions.len(), source.triangles.len(), RICHEST_VERTEX);
         let mut flat = source.clone();
         context.charge(bytes, &format!("mesh \"{}\"", flat.name))?;
-        flat.normals = None;
+        (flat.normals, flat.tangents) = (None, None);
         for p in &mut flat.positions {
             *p = (m * glam::Vec3::from(*p).as_dvec3()).as_vec3().to_array();
         }
@@ -188,12 +191,13 @@ fn check_version(context: &Context<'_>, root: &Element<'_>) -> Result<(), Format
 
 fn check_extensions(context: &mut Context<'_>, root: &Element<'_>) -> Result<(), FormatError> {
     let required = root.strings("extensionsRequired");
-    if let Some(unknown) = required.iter().find(|name| !UNDERSTOOD.contains(name)) {
+    let is_known = |name: &&&str| UNDERSTOOD.contains(*name) || IGNORED.contains(*name);
+    if let Some(unknown) = required.iter().find(|name| !is_known(name)) {
         let hint = "Export without it; for compression (Draco, meshopt, Basis) switch the exporter's option off";
         let what = format!("the required extension {unknown}");
         return Err(FormatError::unsupported(context.file, "extensionsRequired", what, hint));
     }
-    for unknown in root.strings("extensionsUsed").iter().filter(|name| !UNDERSTOOD.contains(name)) {
+    for unknown in root.strings("extensionsUsed").iter().filter(|name| !is_known(name)) {
         context.warn("extensionsUsed", format!("extension {unknown} is ignored"));
     }
     Ok(())

@@ -9,7 +9,7 @@ use super::container::Buffers;
 use super::json::Element;
 use crate::context::Context;
 use crate::error::FormatError;
-use crate::geometry::{check_triangles, clean, mesh_bytes};
+use crate::geometry::{check_triangles, clean, mesh_bytes, vertex_bytes};
 
 /// Reads primitives one after the other; keeps what they share.
 pub(super) struct Primitives<'v, 'b> {
@@ -73,10 +73,12 @@ impl<'v, 'b> Primitives<'v, 'b> {
         // The cleaning sorts keys of 16 bytes per triangle; given back below.
         context.charge(triangles as u64 * 16, &primitive.path)?;
         self.grow(context, &positions)?;
-        context.charge(mesh_bytes(0, triangles, false, false), &primitive.path)?;
+        context.charge(mesh_bytes(0, triangles, 0), &primitive.path)?;
 
         let normals = self.optional(context, root, &attributes, "NORMAL", "VEC3", positions.count);
-        let texcoords = self.optional(context, root, &attributes, "TEXCOORD_0", "VEC2", positions.count);
+        let tangents = self.optional(context, root, &attributes, "TANGENT", "VEC4", positions.count);
+        let [texcoords, second] = ["TEXCOORD_0", "TEXCOORD_1"]
+            .map(|key| self.optional(context, root, &attributes, key, "VEC2", positions.count));
 
         // Corners to triangles, vertices in the order of their first use.
         let corner = |i: usize| -> Result<u32, FormatError> {
@@ -113,11 +115,14 @@ impl<'v, 'b> Primitives<'v, 'b> {
             return Err(fault);
         }
 
-        let bytes = mesh_bytes(used.len(), 0, normals.is_some(), texcoords.is_some());
+        let sets = usize::from(texcoords.is_some()) + usize::from(second.is_some());
+        let bytes = mesh_bytes(used.len(), 0, vertex_bytes(normals.is_some(), tangents.is_some(), sets));
         context.charge(bytes, &primitive.path)?;
         mesh.positions = used.iter().map(|&i| positions.floats(i as usize)).collect();
         mesh.normals = normals.map(|n| used.iter().map(|&i| n.floats(i as usize)).collect());
+        mesh.tangents = tangents.map(|t| used.iter().map(|&i| t.floats(i as usize)).collect());
         mesh.texcoords = texcoords.map(|t| used.iter().map(|&i| t.floats(i as usize)).collect());
+        mesh.second_texcoords = second.map(|t| used.iter().map(|&i| t.floats(i as usize)).collect());
         clean(context, &mut mesh);
         context.budget.release(triangles as u64 * 16);
         Ok(Some(mesh).filter(|m| !m.triangles.is_empty()))
@@ -152,7 +157,7 @@ impl<'v, 'b> Primitives<'v, 'b> {
         let all = [Component::F32, Component::I8, Component::U8, Component::I16, Component::U16];
         let components: &[Component] = match (key, self.quantized) {
             (_, true) => &all,
-            ("TEXCOORD_0", _) => &[Component::F32, Component::U8, Component::U16],
+            ("TEXCOORD_0" | "TEXCOORD_1", _) => &[Component::F32, Component::U8, Component::U16],
             _ => &[Component::F32],
         };
         Accessor::load(root, self.buffers, &element, &Expected { kind, components }).map(Some)

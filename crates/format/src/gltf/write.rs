@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use glam::{DAffine3, DMat3};
 use serde_json::{Map, Value, json};
 use twinray_scene::{
-    Camera, Environment, Material, Mesh, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureRef, Wrap,
+    Camera, Environment, Material, Mesh, NormalMap, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureRef,
+    TextureTransform, Transmission, Volume, Wrap,
 };
 
 use crate::png::encode_rgba;
@@ -16,9 +17,9 @@ use crate::png::encode_rgba;
 /// Writes `scene` as binary glTF 2.0 (`.glb`).
 ///
 /// Emission above 1 uses `KHR_materials_emissive_strength`, pure Lambertian surfaces `KHR_materials_specular` with
-/// factor 0, glass `KHR_materials_transmission`. Phong lobes, which glTF does not have, become the
-/// metallic-roughness lobe of about the same width, α = √(2/(exponent + 2)); the material's `extras` note the
-/// original values. Surroundings and the suggested number of patches go to `asset.extras.twinray`, where
+/// factor 0, glass `KHR_materials_transmission` and, for bodies, `KHR_materials_volume`. Phong lobes, which glTF does
+/// not have, become the metallic-roughness lobe of about the same width, α = √(2/(exponent + 2)); the material's
+/// `extras` note the original values, which `read_scene` finds again, too. Surroundings and the suggested number of patches go to `asset.extras.twinray`, where
 /// `read_scene` finds them again. Meshes without triangles are left out.
 ///
 /// # Panics
@@ -118,7 +119,8 @@ struct Writer {
     meshes: Vec<Value>,
     textures: Vec<Value>,
     samplers: Vec<Value>,
-    known: Vec<TextureRef>,
+    /// Picture, tiling and filter of each texture.
+    known: Vec<(usize, [Wrap; 2], bool)>,
     extensions: BTreeSet<&'static str>,
 }
 
@@ -162,8 +164,13 @@ impl Writer {
         if let Some(normals) = &mesh.normals {
             attributes["NORMAL"] = json!(self.floats(normals, "VEC3"));
         }
-        if let Some(texcoords) = &mesh.texcoords {
-            attributes["TEXCOORD_0"] = json!(self.floats(texcoords, "VEC2"));
+        if let Some(tangents) = &mesh.tangents {
+            attributes["TANGENT"] = json!(self.floats(tangents, "VEC4"));
+        }
+        for (key, texcoords) in [("TEXCOORD_0", &mesh.texcoords), ("TEXCOORD_1", &mesh.second_texcoords)] {
+            if let Some(texcoords) = texcoords {
+                attributes[key] = json!(self.floats(texcoords, "VEC2"));
+            }
         }
         let bytes: Vec<u8> = mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
         let indices = self.accessor(&bytes, mesh.triangles.len() * 3, "SCALAR", 5125, 34963);
@@ -175,45 +182,7 @@ impl Writer {
     fn material(&mut self, material: &Material) -> Value {
         let mut out = json!({ "name": material.name });
         let mut extensions = Map::new();
-        match &material.surface {
-            Surface::Lambertian { reflectance } => {
-                out["pbrMetallicRoughness"] = self.pbr(reflectance, 0.0, 1.0);
-                extensions.insert("KHR_materials_specular".into(), json!({ "specularFactor": 0.0 }));
-            }
-            Surface::MetallicRoughness {
-                base_color,
-                metallic,
-                roughness,
-                metallic_roughness_texture,
-                specular,
-                specular_color,
-                ior,
-                ..
-            } => {
-                let mut pbr = self.pbr(base_color, *metallic, *roughness);
-                if let Some(texture) = metallic_roughness_texture {
-                    pbr["metallicRoughnessTexture"] = self.texture(texture);
-                }
-                out["pbrMetallicRoughness"] = pbr;
-                if (*specular, *specular_color) != (1.0, Rgb::WHITE) {
-                    let color = specular_color.to_array();
-                    let value = json!({ "specularFactor": specular, "specularColorFactor": color });
-                    extensions.insert("KHR_materials_specular".into(), value);
-                }
-                if *ior != 1.5 {
-                    extensions.insert("KHR_materials_ior".into(), json!({ "ior": ior }));
-                }
-            }
-            Surface::Phong { diffuse, specular, exponent } => {
-                // α = √(2/(n + 2)) and α = roughness². The lobe's colour is F0, 0.04 × the specular colour.
-                let roughness = (2.0 / (exponent + 2.0)).powf(0.25);
-                out["pbrMetallicRoughness"] = self.pbr(diffuse, 0.0, roughness);
-                let color = (*specular / 0.04).to_array();
-                extensions.insert("KHR_materials_specular".into(), json!({ "specularColorFactor": color }));
-                let original = json!({ "specular": specular.to_array(), "exponent": exponent });
-                out["extras"] = json!({ "twinray_phong": original });
-            }
-        }
+        self.surface(material, &mut out, &mut extensions);
         self.emission(material, &mut out, &mut extensions);
         if material.two_sided {
             out["doubleSided"] = json!(true);
@@ -226,20 +195,95 @@ impl Writer {
             }
             Opacity::Blend => out["alphaMode"] = json!("BLEND"),
         }
-        if material.transmission.is_some() {
-            extensions.insert("KHR_materials_transmission".into(), json!({ "transmissionFactor": 1.0 }));
+        if let Some(transmission) = &material.transmission {
+            self.transmission(transmission, &mut extensions);
         }
-        const WRITTEN: [&str; 4] = [
+        if let Some(NormalMap { texture, scale }) = &material.normal_map {
+            out["normalTexture"] = self.texture(texture);
+            if *scale != 1.0 {
+                out["normalTexture"]["scale"] = json!(scale);
+            }
+        }
+        const WRITTEN: [&str; 5] = [
             "KHR_materials_emissive_strength",
             "KHR_materials_ior",
             "KHR_materials_specular",
             "KHR_materials_transmission",
+            "KHR_materials_volume",
         ];
         self.extensions.extend(WRITTEN.into_iter().filter(|name| extensions.contains_key(*name)));
         if !extensions.is_empty() {
             out["extensions"] = Value::Object(extensions);
         }
         out
+    }
+
+    fn surface(&mut self, material: &Material, out: &mut Value, extensions: &mut Map<String, Value>) {
+        match &material.surface {
+            Surface::Lambertian { reflectance } => {
+                // Without a lobe, roughness is that of what passes, which a Lambertian surface does not blur.
+                let roughness = if material.transmission.is_some() { 0.0 } else { 1.0 };
+                out["pbrMetallicRoughness"] = self.pbr(reflectance, 0.0, roughness);
+                extensions.insert("KHR_materials_specular".into(), json!({ "specularFactor": 0.0 }));
+            }
+            Surface::MetallicRoughness {
+                base_color,
+                metallic,
+                roughness,
+                metallic_roughness_texture,
+                specular,
+                specular_texture,
+                specular_color,
+                specular_color_texture,
+                ior,
+            } => {
+                let mut pbr = self.pbr(base_color, *metallic, *roughness);
+                if let Some(texture) = metallic_roughness_texture {
+                    pbr["metallicRoughnessTexture"] = self.texture(texture);
+                }
+                out["pbrMetallicRoughness"] = pbr;
+                let textures =
+                    [("specularTexture", specular_texture), ("specularColorTexture", specular_color_texture)];
+                if (*specular, *specular_color) != (1.0, Rgb::WHITE) || textures.iter().any(|t| t.1.is_some()) {
+                    let color = specular_color.to_array();
+                    let mut value = json!({ "specularFactor": specular, "specularColorFactor": color });
+                    for (key, texture) in textures {
+                        if let Some(texture) = texture {
+                            value[key] = self.texture(texture);
+                        }
+                    }
+                    extensions.insert("KHR_materials_specular".into(), value);
+                }
+                if *ior != 1.5 {
+                    extensions.insert("KHR_materials_ior".into(), json!({ "ior": ior }));
+                }
+            }
+            Surface::Phong { diffuse, specular, exponent } => {
+                out["pbrMetallicRoughness"] = self.pbr(diffuse, 0.0, phong_roughness(*exponent));
+                let color = (*specular / PHONG_F0).to_array();
+                extensions.insert("KHR_materials_specular".into(), json!({ "specularColorFactor": color }));
+                let original = json!({ "specular": specular.to_array(), "exponent": exponent });
+                out["extras"] = json!({ "twinray_phong": original });
+            }
+        }
+    }
+
+    fn transmission(&mut self, transmission: &Transmission, extensions: &mut Map<String, Value>) {
+        let mut value = json!({ "transmissionFactor": transmission.factor });
+        if let Some(texture) = &transmission.texture {
+            value["transmissionTexture"] = self.texture(texture);
+        }
+        extensions.insert("KHR_materials_transmission".into(), value);
+        let Some(Volume { attenuation }) = transmission.volume else { return };
+        // Any thickness above 0 says that there is an inside.
+        let mut value = json!({ "thicknessFactor": 1.0 });
+        let most = attenuation.max_channel();
+        if most > 1e-100 {
+            // At this distance no channel is below 1/e, where a logarithm would lose digits.
+            value["attenuationDistance"] = json!(1.0 / most);
+            value["attenuationColor"] = json!((attenuation / most).map(|c| (-c).exp()).to_array());
+        }
+        extensions.insert("KHR_materials_volume".into(), value);
     }
 
     fn pbr(&mut self, Texel { factor, alpha, texture }: &Texel, metallic: f64, roughness: f64) -> Value {
@@ -267,9 +311,26 @@ impl Writer {
         }
     }
 
+    /// A slot's object.
     fn texture(&mut self, texture: &TextureRef) -> Value {
-        if let Some(known) = self.known.iter().position(|t| t == texture) {
-            return json!({ "index": known });
+        let mut slot = json!({ "index": self.sampled(texture) });
+        if texture.set != 0 {
+            slot["texCoord"] = json!(texture.set);
+        }
+        let TextureTransform { offset, rotation, scale } = texture.transform;
+        if texture.transform != TextureTransform::default() {
+            let transform = json!({ "offset": offset, "rotation": rotation, "scale": scale });
+            slot["extensions"] = json!({ "KHR_texture_transform": transform });
+            self.extensions.insert("KHR_texture_transform");
+        }
+        slot
+    }
+
+    /// Index of the picture with its sampler, which slots may share.
+    fn sampled(&mut self, texture: &TextureRef) -> usize {
+        let key = (texture.image, texture.wrap, texture.nearest);
+        if let Some(known) = self.known.iter().position(|k| *k == key) {
+            return known;
         }
         let wrap = texture.wrap.map(|w| match w {
             Wrap::Repeat => 10497,
@@ -279,10 +340,18 @@ impl Writer {
         let filter = if texture.nearest { 9728 } else { 9729 };
         self.samplers.push(json!({ "wrapS": wrap[0], "wrapT": wrap[1], "magFilter": filter }));
         self.textures.push(json!({ "source": texture.image, "sampler": self.samplers.len() - 1 }));
-        self.known.push(texture.clone());
-        json!({ "index": self.textures.len() - 1 })
+        self.known.push(key);
+        self.textures.len() - 1
     }
 }
+
+/// The perceptual roughness of about the width of a Phong lobe: α = √(2/(n + 2)), and α = roughness².
+pub(super) fn phong_roughness(exponent: f64) -> f64 {
+    (2.0 / (exponent + 2.0)).powf(0.25)
+}
+
+/// Reflectance of glTF's lobe at normal incidence, which its colour multiplies.
+pub(super) const PHONG_F0: f64 = 0.04;
 
 fn set_transform(node: &mut Value, transform: &DAffine3) {
     if transform.matrix3 != DMat3::IDENTITY {

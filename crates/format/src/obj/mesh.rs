@@ -13,7 +13,7 @@ use super::parse::{Document, Group, NONE};
 use super::polygon::Triangulator;
 use crate::context::Context;
 use crate::error::FormatError;
-use crate::geometry::{check_triangles, clean, mesh_bytes};
+use crate::geometry::{check_triangles, clean, mesh_bytes, vertex_bytes};
 
 /// The point that mesh coordinates are relative to: the origin, unless the file lies so far away that f32 would
 /// lose more than a bit to the distance.
@@ -50,7 +50,7 @@ impl Builder<'_> {
         let triangles = group.corners.len() - 2 * group.sizes.len();
         self.triangles += triangles as u64;
         check_triangles(context, &element, self.triangles)?;
-        context.charge(mesh_bytes(0, triangles, false, false), &element)?;
+        context.charge(mesh_bytes(0, triangles, 0), &element)?;
 
         let mut mesh = Mesh { name: group.name.clone(), ..Mesh::default() };
         let mut vertices = Vertices::default();
@@ -89,7 +89,7 @@ impl Builder<'_> {
         drop(group);
         let corners = std::mem::take(&mut vertices.corners);
         drop(vertices);
-        context.charge(mesh_bytes(corners.len(), 0, smooth, textured), &element)?;
+        context.charge(mesh_bytes(corners.len(), 0, vertex_bytes(smooth, false, usize::from(textured))), &element)?;
         mesh.positions = corners.iter().map(|c| self.point(c[0]).as_vec3().to_array()).collect();
         if textured {
             mesh.texcoords = Some(corners.iter().map(|c| self.texcoord(c[1])).collect());

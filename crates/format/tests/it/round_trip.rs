@@ -5,11 +5,14 @@ use std::sync::Arc;
 use glam::{DAffine3, DQuat, DVec3, dvec3};
 use twinray_format::{Reading, write_glb, write_obj};
 use twinray_scene::{
-    Camera, Environment, Instance, Material, Mesh, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureImage,
-    TextureRef, Transmission, Wrap,
+    Camera, Environment, Instance, Material, Mesh, NormalMap, Opacity, Projection, Rgb, Scene, Surface, Texel,
+    TextureImage, TextureRef, TextureTransform, Transmission, Volume, Wrap,
 };
 
 use crate::support::{colour, read, read_with, warnings, world_triangles};
+
+/// Of very different strengths, none of which may be lost.
+const ABSORBS: Rgb = Rgb { r: 0.001, g: 4500.0, b: 0.0 };
 
 /// A scene with one of everything.
 fn everything() -> Scene {
@@ -19,6 +22,11 @@ fn everything() -> Scene {
         factor,
         alpha: 0.75,
         texture: Some(TextureRef { wrap: [Wrap::Mirror, Wrap::Clamp], nearest: true, ..TextureRef::of(0) }),
+    };
+    let moved = |set, rotation| TextureRef {
+        set,
+        transform: TextureTransform { offset: [0.25, -3.0], rotation, scale: [2.0, -0.125] },
+        ..TextureRef::of(0)
     };
     let material = |name: &str, surface| Material { name: name.into(), surface, ..Material::default() };
     let materials = vec![
@@ -34,7 +42,8 @@ fn everything() -> Scene {
             emission: Rgb::new(0.5, 0.25, 0.0),
             emission_texture: textured(Rgb::WHITE).texture,
             opacity: Opacity::Mask { cutoff: 0.25 },
-            transmission: Some(Transmission { factor: 1.0, texture: None, volume: None }),
+            transmission: Some(Transmission { factor: 0.75, texture: Some(moved(1, 0.0)), volume: None }),
+            normal_map: Some(NormalMap { texture: moved(0, 0.3), scale: 0.5 }),
             ..material(
                 "metal",
                 Surface::MetallicRoughness {
@@ -43,10 +52,22 @@ fn everything() -> Scene {
                     roughness: 0.3,
                     metallic_roughness_texture: textured(Rgb::WHITE).texture,
                     specular: 0.5,
+                    specular_texture: Some(moved(1, -2.0)),
                     specular_color: Rgb::new(1.0, 0.5, 0.25),
+                    specular_color_texture: Some(TextureRef { set: 1, ..TextureRef::of(0) }),
                     ior: 1.33,
                 },
             )
+        },
+        Material {
+            opacity: Opacity::Blend,
+            transmission: Some(Transmission {
+                factor: 1.0,
+                texture: None,
+                volume: Some(Volume { attenuation: ABSORBS }),
+            }),
+            normal_map: Some(NormalMap { texture: TextureRef::of(0), scale: 1.0 }),
+            ..material("water", Surface::Lambertian { reflectance: Texel::constant(Rgb::grey(0.9)) })
         },
         material(
             "gloss",
@@ -57,12 +78,14 @@ fn everything() -> Scene {
         name: name.into(),
         positions: vec![[0.1, 0.0, 0.0], [1.0, 0.3, 0.0], [0.0, 1.0, 0.7], [-1.0, -1.0, 1.0 / 3.0]],
         normals: rich.then(|| vec![[0.0, 0.0, 1.0]; 4]),
+        tangents: rich.then(|| vec![[0.6, 0.8, 0.0, 1.0], [1.0, 0.0, 0.0, -1.0], [0.0, 1.0, 0.0, 1.0], [0.0; 4]]),
         texcoords: rich.then(|| vec![[0.0, 0.25], [1.0, 0.0], [0.3, 1.0], [-2.0, 3.5]]),
+        second_texcoords: rich.then(|| vec![[0.5, 0.25], [1.0, 7.0], [0.3, 0.1], [-2.5, 0.5]]),
         triangles: vec![[0, 1, 2], [2, 3, 0]],
         material,
-        ..Mesh::default()
     };
-    let meshes = vec![mesh("a", 0, true), mesh("b", 1, false), mesh("c", 2, true), mesh("d", 3, false)];
+    let meshes =
+        vec![mesh("a", 0, true), mesh("b", 1, false), mesh("c", 2, true), mesh("d", 3, true), mesh("e", 4, false)];
     let place = |name: &str, mesh, transform| Instance { name: name.into(), mesh, transform };
     let turned = DAffine3::from_scale_rotation_translation(
         dvec3(2.0, -1.0, 0.5),
@@ -75,6 +98,7 @@ fn everything() -> Scene {
         place("moved", 1, DAffine3::from_translation(dvec3(10.0, 0.0, 1e-3))),
         place("c", 2, turned),
         place("d", 3, DAffine3::IDENTITY),
+        place("e", 4, DAffine3::IDENTITY),
     ];
     let mut camera = Camera::look_at("eye", dvec3(3.0, 2.0, 1.0), DVec3::ZERO, DVec3::Y, 40.0);
     camera.aspect = Some(1.5);
@@ -89,6 +113,7 @@ fn everything() -> Scene {
         cameras: vec![camera, plan],
         environment: Some(Environment::Uniform(Rgb::new(1.0, 2.0, 3.5))),
         suggested_patches: Some(1234),
+        ..Scene::default()
     }
 }
 
@@ -97,7 +122,7 @@ fn close(a: Rgb, b: Rgb) -> bool {
 }
 
 #[test]
-fn glb_keeps_everything_but_phong() {
+fn glb_keeps_everything() {
     let scene = everything();
     let bytes = write_glb(&scene);
     assert_eq!(bytes, write_glb(&scene), "equal scenes, equal bytes");
@@ -110,37 +135,48 @@ fn glb_keeps_everything_but_phong() {
         let (a, b) = (&read.meshes[a.mesh], &scene.meshes[b.mesh]);
         assert_eq!((&a.positions, &a.triangles, &a.normals), (&b.positions, &b.triangles, &b.normals));
         assert_eq!((&a.name, &a.texcoords), (&b.name, &b.texcoords));
+        assert_eq!((&a.tangents, &a.second_texcoords), (&b.tangents, &b.second_texcoords));
     }
     assert_eq!(read.instances.len(), scene.instances.len());
     assert_eq!(read.images[0].rgba, scene.images[0].rgba);
     for (a, b) in read.materials.iter().zip(&scene.materials) {
-        assert_eq!(
-            (&a.name, a.two_sided, a.opacity, a.transmission.is_some()),
-            (&b.name, b.two_sided, b.opacity, b.transmission.is_some())
-        );
+        assert_eq!((&a.name, a.two_sided, a.opacity), (&b.name, b.two_sided, b.opacity));
         assert!(close(a.emission, b.emission), "{a:?}");
-        assert_eq!(a.emission_texture, b.emission_texture);
-        if b.name != "gloss" {
-            assert_eq!(format!("{:?}", a.surface), format!("{:?}", b.surface));
-        }
+        assert_eq!((&a.emission_texture, &a.normal_map), (&b.emission_texture, &b.normal_map));
+        assert_eq!(format!("{:?}", a.surface), format!("{:?}", b.surface));
+        let passing = |m: &Material| m.transmission.clone().map(|t| (t.factor, t.texture, t.volume.is_some()));
+        assert_eq!(passing(a), passing(b));
     }
-    // α = √(2/32) = 0.25, so the roughness is 0.5, and F0 = 0.04 × 7.5 = 0.3.
-    let Surface::MetallicRoughness { base_color, metallic, roughness, specular, specular_color, .. } =
-        &read.materials[3].surface
-    else {
-        panic!()
-    };
-    assert_eq!((base_color.factor, *metallic, *specular), (Rgb::grey(0.4), 0.0, 1.0));
-    assert!(
-        (roughness - 0.5).abs() < 1e-12 && close(*specular_color, Rgb::grey(7.5)),
-        "{roughness} {specular_color:?}"
-    );
+    let attenuation = read.materials[3].transmission.as_ref().unwrap().volume.unwrap().attenuation;
+    assert!((0..3).all(|c| (attenuation[c] - ABSORBS[c]).abs() < 1e-12 * ABSORBS.g), "{attenuation:?}");
     for (a, b) in read.cameras.iter().zip(&scene.cameras) {
         let pairs = a.axes().into_iter().zip(b.axes());
         assert!(pairs.chain([(a.eye, b.eye)]).all(|(a, b)| (a - b).length() < 1e-12));
         assert_eq!((&a.name, a.projection, a.aspect), (&b.name, b.projection, b.aspect));
     }
     assert_eq!(read.cameras.len(), 2);
+}
+
+/// Others see a lobe that glTF knows; who changes it there gets what they see.
+#[test]
+fn phong_lobes_have_a_stand_in() {
+    let scene = everything();
+    let bytes = write_glb(&scene);
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    // α = √(2/32) = 0.25, so the roughness is 0.5, and F0 = 0.04 × 7.5 = 0.3.
+    assert!(text.contains("\"roughnessFactor\":0.5") && text.contains("7.5"), "{text}");
+    let changed: Vec<u8> = {
+        let from = b"\"roughnessFactor\":0.5";
+        let at = bytes.windows(from.len()).position(|w| w == from).unwrap();
+        [&bytes[..at], b"\"roughnessFactor\":0.6", &bytes[at + from.len()..]].concat()
+    };
+    let Surface::MetallicRoughness { base_color, metallic, roughness, specular, specular_color, .. } =
+        read("a.glb", &changed).unwrap().scene.materials.swap_remove(4).surface
+    else {
+        panic!()
+    };
+    assert_eq!((base_color.factor, metallic, roughness, specular), (Rgb::grey(0.4), 0.0, 0.6, 1.0));
+    assert!(close(specular_color, Rgb::grey(7.5)), "{specular_color:?}");
 }
 
 #[test]
@@ -158,8 +194,8 @@ fn glb_needs_neither_cameras_nor_pictures() {
         assert!(!text.contains(absent), "{absent}");
     }
     let read = read("a.glb", &write_glb(&scene)).unwrap().scene;
-    assert_eq!(read.instances.len(), 5);
-    assert_eq!(read.meshes.len(), 4, "a mesh without triangles is left out");
+    assert_eq!(read.instances.len(), 6);
+    assert_eq!(read.meshes.len(), 5, "a mesh without triangles is left out");
     // Nothing but an empty file comes of nothing.
     assert!(crate::support::read("a.glb", &write_glb(&Scene::default())).is_err());
 }
@@ -191,7 +227,7 @@ fn obj_keeps_triangles_and_matt_materials() {
         assert!(a.two_sided);
     }
     assert_eq!(reading.scene.images[0].rgba, scene.images[0].rgba);
-    let Surface::Phong { specular, exponent, .. } = &reading.scene.materials[3].surface else { panic!() };
+    let Surface::Phong { specular, exponent, .. } = &reading.scene.materials[4].surface else { panic!() };
     assert_eq!((*specular, *exponent), (Rgb::grey(0.3), 30.0));
     assert_eq!(reading.scene.meshes[0].texcoords, scene.meshes[0].texcoords);
 }
@@ -209,7 +245,7 @@ fn obj_survives_odd_names() {
     let beside: [(&str, &[u8]); 1] = [(&files.mtl_name, &files.mtl)];
     let reading = read_with("a.obj", &files.obj, &beside).unwrap();
     let names: Vec<_> = reading.scene.instances.iter().map(|i| i.name.as_str()).collect();
-    assert_eq!(names, ["a", "a.2", "two words_", "line_break", "object"]);
-    assert_eq!(reading.scene.materials.len(), 4);
+    assert_eq!(names, ["a", "a.2", "two words_", "line_break", "object", "e"]);
+    assert_eq!(reading.scene.materials.len(), 5);
     assert_eq!(reading.scene.materials[1].emission, scene.materials[1].emission);
 }
