@@ -21,12 +21,6 @@ pub struct Crop {
 }
 
 impl Crop {
-    /// True of a pixel of the whole film that is in it.
-    pub(crate) fn holds(&self, x: usize, y: usize) -> bool {
-        let within = |at: usize, first: u32, count: u32| at >= first as usize && at - (first as usize) < count as usize;
-        within(x, self.x, self.width) && within(y, self.y, self.height)
-    }
-
     /// Whether it holds a pixel, and none beyond a film of so many columns and rows.
     pub fn lies_within(&self, width: u32, height: u32) -> bool {
         let inside =

@@ -5,11 +5,11 @@
 //! solution knows of the light at its far end, and lobes met there are followed further. Where it is too short for
 //! patches to look even, its end is a point like the first. No patch is seen directly: shadows and textures are sharp,
 //! and only light of two bounces and more is as smooth as patches are.
-//! `sample` follows one camera ray; `tile` lets neighbours share what their gather rays find; `block` is the work of one
-//! task and learns which lamps matter there; `pass` decides how many rays each block gets.
+//! `sample` follows one camera ray; `tile` lets neighbours share what their gather rays find; `places` learn which lamps
+//! light them; `pass` decides how many rays each place gets.
 
-mod block;
 mod pass;
+mod places;
 mod sample;
 mod tile;
 
@@ -19,7 +19,7 @@ use twinray_solve::Solution;
 use crate::film::{Crop, Film};
 use crate::picture::Picture;
 use crate::sums::{self, PixelSums};
-use block::{Block, EDGE};
+use places::Places;
 use sample::Estimator;
 
 /// Settings of a gather.
@@ -51,8 +51,11 @@ pub struct Gather<'a> {
     film: Film,
     seed: u64,
     adaptive: bool,
-    /// Row by row, on the blocks' grid over the whole film.
-    blocks: Vec<Block>,
+    /// Row by row of the window.
+    pixels: Vec<PixelSums>,
+    places: Places,
+    /// Batches so far.
+    batches: u32,
     /// Camera rays so far.
     rays: u64,
 }
@@ -62,21 +65,15 @@ impl<'a> Gather<'a> {
     pub fn new(scene: &'a PatchScene, solution: &'a Solution, camera: &Camera, options: &GatherOptions) -> Self {
         let film = Film::new(options.width, options.height, options.crop);
         let estimator = Estimator::new(scene, solution);
-        let grid = Grid::new(&film.window);
-        let blocks = (0..grid.rows)
-            .flat_map(|row| (0..grid.columns).map(move |column| (column, row)))
-            .map(|(column, row)| {
-                let first = ((grid.column + column) * EDGE, (grid.row + row) * EDGE);
-                Block::new(first, film.window, options.width as usize, &estimator.lights)
-            })
-            .collect();
+        let places = Places::new(film.window, &estimator.lights);
+        let pixels = vec![PixelSums::default(); film.len()];
         let (seed, adaptive) = (options.seed, options.adaptive);
-        Self { estimator, camera: camera.clone(), film, seed, adaptive, blocks, rays: 0 }
+        Self { estimator, camera: camera.clone(), film, seed, adaptive, pixels, places, batches: 0, rays: 0 }
     }
 
     /// Camera rays per pixel so far, mean.
     pub fn samples(&self) -> f64 {
-        self.rays as f64 / self.pixel_count().max(1) as f64
+        self.rays as f64 / self.pixels.len().max(1) as f64
     }
 
     /// Camera rays so far.
@@ -86,80 +83,38 @@ impl<'a> Gather<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        sums::picture(&self.pixels(), self.film.window.width)
+        sums::picture(&self.pixels, self.film.window.width)
     }
 
     /// The part of every pixel that is emitted where it is seen, or reflected straight from what emits; linear radiance.
     pub fn direct(&self) -> Vec<[f32; 3]> {
-        self.pixels().iter().map(|p| (p.lights() + p.direct()).to_f32()).collect()
+        self.pixels.iter().map(|p| (p.lights() + p.direct()).to_f32()).collect()
     }
 
     /// All other light of every pixel, linear radiance.
     pub fn indirect(&self) -> Vec<[f32; 3]> {
-        self.pixels().iter().map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
+        self.pixels.iter().map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
     /// second batch of rays.
     pub fn variance(&self) -> Vec<f32> {
-        self.pixels().iter().map(|p| p.variance() as f32).collect()
+        self.pixels.iter().map(|p| p.variance() as f32).collect()
     }
 
     /// Relative RMS error of the pixels' luminance by their noise, √(Σ variance / Σ 𝓛²), over pixels that no light
     /// covers; over all pixels if there are no others. Infinite before the second batch; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
-        sums::relative_error(&self.pixels())
+        sums::relative_error(&self.pixels)
     }
 
     /// Camera rays that were dropped because their radiance was not finite; 0 unless something is wrong.
     pub fn invalid(&self) -> u64 {
-        self.pixels().iter().map(|p| u64::from(p.invalid())).sum()
+        self.pixels.iter().map(|p| u64::from(p.invalid())).sum()
     }
 
-    fn pixel_count(&self) -> usize {
-        self.film.len()
-    }
-
-    /// Blocks of the window.
-    fn grid(&self) -> Grid {
-        Grid::new(&self.film.window)
-    }
-
-    /// Sums of a pixel of the whole film that is in the window.
-    fn pixel(&self, x: usize, y: usize) -> &PixelSums {
-        let grid = self.grid();
-        self.blocks[grid.index(x / EDGE, y / EDGE)].pixel(x, y)
-    }
-
-    /// Sums of all pixels, row by row.
-    fn pixels(&self) -> Vec<PixelSums> {
-        let places = (0..self.film.len()).map(|index| self.film.place(index));
-        places.map(|[x, y]| *self.pixel(x as usize, y as usize)).collect()
-    }
-}
-
-/// Blocks of the whole film that have a part in a window.
-#[derive(Clone, Copy, Debug)]
-struct Grid {
-    /// First column and row, in blocks of the whole film.
-    column: usize,
-    row: usize,
-    columns: usize,
-    rows: usize,
-}
-
-impl Grid {
-    fn new(window: &Crop) -> Self {
-        let range = |first: u32, count: u32| {
-            let (first, end) = (first as usize, first as usize + count as usize);
-            (first / EDGE, end.div_ceil(EDGE) - first / EDGE)
-        };
-        let ((column, columns), (row, rows)) = (range(window.x, window.width), range(window.y, window.height));
-        Self { column, row, columns, rows }
-    }
-
-    /// Number in the window of a block of the whole film, row by row.
-    fn index(&self, column: usize, row: usize) -> usize {
-        (row - self.row) * self.columns + column - self.column
+    /// Sums of a pixel of the window.
+    fn sums_of(&self, x: usize, y: usize) -> &PixelSums {
+        &self.pixels[y * self.film.window.width as usize + x]
     }
 }

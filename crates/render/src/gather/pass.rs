@@ -1,26 +1,35 @@
-//! How many camera rays each block gets.
+//! Camera rays by the pass: how many each place of the film gets, and the tiles that they are shot in.
 //!
-//! After the first passes a block's share follows its noise: for the least mean square of relative errors, rays go
-//! ∝ σ/(L + ε) (Neyman's allocation). Noise is that of the block and its neighbours together, so that none stops early
+//! After the first passes a place's share follows its noise: for the least mean square of relative errors, rays go
+//! ∝ σ/(L + ε) (Neyman's allocation). Noise is that of the place and its neighbours together, so that none stops early
 //! because it happened to look even.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 use twinray_scene::sample::PixelSample;
 
-use super::block::{BATCH, Block};
-use super::{Gather, Grid};
+use super::Gather;
+use super::places::{EDGE, Lessons};
+use super::tile::{PIXELS, SIDE, Tile, TilePixel};
 use crate::film::tent;
+use crate::sums::{PixelSums, Seen};
 
-/// Batches of every block before noise decides.
+/// Camera rays of a batch.
+const BATCH: u32 = 4;
+/// Batches of every pixel before noise decides.
 const FIRST: u64 = 2;
-/// The most batches of a block over those of the mean.
+/// The most batches of a pixel over those of the mean.
 const MOST: f64 = 16.0;
 /// The least.
 const LEAST: f64 = 0.25;
-/// Of the mean luminance, what is added to a block's where errors are relative.
+/// Of the mean luminance, what is added to a place's where errors are relative.
 const DARK: f64 = 0.05;
+/// Where tiles begin, batch after batch, or what neighbours share would show as squares: offsets to the left and upwards, in
+/// an order that leaves no two alike neighbours.
+const OFFSETS: [usize; SIDE] = [0, 2, 1, 3];
 
-/// What is known of a block.
+/// What is known of a place.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
     pixels: f64,
@@ -30,55 +39,50 @@ struct Known {
     batches: f64,
 }
 
-impl Known {
-    fn of(block: &Block) -> Self {
-        let wanted = || block.sums.iter().filter(|p| p.rays() > 0);
-        let pixels = wanted().count() as f64;
-        Self {
-            pixels,
-            luminance: wanted().map(|p| p.radiance().luminance()).sum::<f64>() / pixels,
-            variance: wanted().map(|p| p.variance_of_batch()).sum::<f64>() / pixels,
-            batches: f64::from(block.batches()),
-        }
-    }
+/// Rows of the window that share tiles, with their sums.
+struct Band<'a> {
+    rows: Range<usize>,
+    sums: &'a mut [PixelSums],
 }
 
 impl Gather<'_> {
     /// Adds passes until there are about `samples` camera rays per pixel; results depend on the sequence of calls, not
     /// on threads.
     pub fn advance_to(&mut self, samples: f64) {
-        let pixels = self.pixel_count().max(1) as f64;
+        let pixels = self.pixels.len().max(1) as f64;
         let per_pixel = |rays: u64| rays as f64 / pixels / f64::from(BATCH);
         let wished = (samples / f64::from(BATCH)).max(1.0);
         let done = per_pixel(self.rays);
         if done < FIRST as f64 || !self.adaptive {
-            // Whole passes over all blocks.
+            // Whole passes, one batch at a time: places learn from each.
             let even = if self.adaptive { wished.min(FIRST as f64) } else { wished };
-            // One at a time: blocks learn from each.
+            let all = vec![1; self.places.size().0 * self.places.size().1];
             for _ in 0..(even - done).ceil().max(0.0) as u64 {
-                self.pass(&|_| 1);
+                self.pass(&all);
             }
         }
         let done = per_pixel(self.rays);
         if self.adaptive && done < wished {
             let plan = self.plan((wished - done) * pixels);
-            self.pass(&|block| plan[block]);
+            self.pass(&plan);
         }
     }
 
-    /// Batches for every block, about `budget` batches of pixels in all.
+    /// Batches for every place, about `budget` batches of pixels in all.
     fn plan(&self, budget: f64) -> Vec<u32> {
-        let Grid { columns, rows, .. } = self.grid();
-        let known: Vec<Known> = self.blocks.par_iter().map(Known::of).collect();
+        let (columns, rows) = self.places.size();
+        let known: Vec<Known> = (0..columns * rows).into_par_iter().map(|place| self.known(place)).collect();
         let total_pixels: f64 = known.iter().map(|k| k.pixels).sum();
         let mean = known.iter().map(|k| k.pixels * k.luminance).sum::<f64>() / total_pixels.max(1.0);
         let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
         let noise: Vec<f64> = (0..known.len())
             .map(|t| {
                 let around = near(t / columns, rows).flat_map(|y| near(t % columns, columns).map(move |x| (x, y)));
+                // The place itself counts as much as all around it.
                 let (variance, luminance, count) = around.fold((0.0, 0.0, 0.0), |(v, l, n), (x, y)| {
-                    let k = &known[y * columns + x];
-                    (v + k.variance, l + k.luminance, n + 1.0)
+                    let other = y * columns + x;
+                    let (k, weight) = (&known[other], if other == t { 8.0 } else { 1.0 });
+                    (v + weight * k.variance, l + weight * k.luminance, n + weight)
                 });
                 let relative = (variance / count).sqrt() / (luminance / count + DARK * mean).max(1e-300);
                 if relative.is_finite() { relative } else { 0.0 }
@@ -99,24 +103,126 @@ impl Gather<'_> {
         let mut carried = 0.0;
         (0..known.len())
             .map(|t| {
-                carried += due(high, t) - known[t].batches;
-                let batches = carried.floor().max(0.0);
-                carried -= batches;
+                carried += (due(high, t) - known[t].batches) * known[t].pixels;
+                let batches = (carried / known[t].pixels).floor().max(0.0);
+                carried -= batches * known[t].pixels;
                 batches as u32
             })
             .collect()
     }
 
-    /// Shoots so many batches for every block.
-    fn pass(&mut self, batches: &(dyn Fn(usize) -> u32 + Sync)) {
-        let Self { estimator, camera, film, seed, blocks, .. } = self;
-        blocks.par_iter_mut().enumerate().for_each(|(number, block)| {
-            let ray = |x: usize, y: usize, numbers: &mut PixelSample| {
-                let (place, lens) = (numbers.pair().map(tent), numbers.pair());
-                film.ray(camera, [x as u32, y as u32], place, lens)
-            };
-            block.shoot(estimator, *seed, batches(number), ray);
-        });
-        self.rays = self.blocks.iter().flat_map(|b| &b.sums).map(|p| u64::from(p.rays())).sum();
+    /// What is known of a place.
+    fn known(&self, place: usize) -> Known {
+        let [columns, rows] = self.places.pixels(place);
+        let mut known = Known::default();
+        for p in rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| self.sums_of(x, y)) {
+            known.pixels += 1.0;
+            known.luminance += p.radiance().luminance();
+            known.variance += p.variance_of_batch();
+            known.batches = f64::from(p.rays() / BATCH);
+        }
+        known.luminance /= known.pixels;
+        known.variance /= known.pixels;
+        known
     }
+
+    /// Shoots so many batches in every place.
+    fn pass(&mut self, batches: &[u32]) {
+        for round in 0..batches.iter().copied().max().unwrap_or(0) {
+            let is_open = |place: usize| batches[place] > round;
+            self.batch(&is_open);
+            self.batches += 1;
+        }
+        self.places.conclude(&self.estimator.lights);
+        self.rays = self.pixels.iter().map(|p| u64::from(p.rays())).sum();
+    }
+
+    /// One batch in the places that are open.
+    fn batch(&mut self, is_open: &(dyn Fn(usize) -> bool + Sync)) {
+        let lie = (self.batches % (SIDE * SIDE) as u32) as usize;
+        let [left, above] = [OFFSETS[lie % SIDE], OFFSETS[(lie / SIDE + lie) % SIDE]];
+        let width = self.film.window.width as usize;
+        let mut pixels = std::mem::take(&mut self.pixels);
+        let this = &*self;
+        let lessons: Vec<(usize, Lessons)> = bands(&mut pixels, width, above)
+            .into_par_iter()
+            .enumerate()
+            .map(|(number, band)| this.shoot(band, number, lie, left, is_open))
+            .collect();
+        self.pixels = pixels;
+        for (row, lessons) in &lessons {
+            self.places.learn(*row, lessons);
+        }
+    }
+
+    /// Shoots the batch of a band; returns what was learnt, and of which row of places on.
+    fn shoot(
+        &self,
+        band: Band,
+        number: usize,
+        lie: usize,
+        left: usize,
+        is_open: &(dyn Fn(usize) -> bool + Sync),
+    ) -> (usize, Lessons) {
+        let Band { rows, sums } = band;
+        let window = &self.film.window;
+        let width = window.width as usize;
+        let rows_of_places = rows.start / EDGE..(rows.end - 1) / EDGE + 1;
+        let first_place = self.places.of(0, rows.start);
+        let mut lessons = self.places.lessons_of(rows_of_places.clone());
+        let by_power = self.estimator.shadows();
+        // A band may be lower than a tile is; its first tile may be narrower.
+        let first_row = SIDE - rows.len().min(SIDE);
+        for column in 0..(width + left).div_ceil(SIDE) {
+            let pixels: Vec<TilePixel> = (0..PIXELS)
+                .filter_map(|slot| {
+                    let x = (column * SIDE + slot % SIDE).checked_sub(left).filter(|x| *x < width)?;
+                    let y = rows.start + (slot / SIDE).checked_sub(if number == 0 { first_row } else { 0 })?;
+                    let place = (y < rows.end).then(|| self.places.of(x, y)).filter(|p| is_open(*p))?;
+                    let at = [window.x + x as u32, window.y + y as u32];
+                    Some(TilePixel { x, y, number: self.film.number(at), slot, place: place - first_place })
+                })
+                .collect();
+            if pixels.is_empty() {
+                continue;
+            }
+            let tile = Tile {
+                // Tiles that lie alike are sequences of their own.
+                number: ((number as u64) << 32 | column as u64) << 4 | lie as u64,
+                pixels: &pixels,
+                seed: self.seed,
+                first: self.batches / (SIDE * SIDE) as u32 * BATCH,
+            };
+            let mut seen = [Seen::default(); PIXELS];
+            let sums_of = |p: &TilePixel| (p.y - rows.start) * width + p.x;
+            let before: Vec<u32> = pixels.iter().map(|p| sums[sums_of(p)].rays()).collect();
+            let ray = |p: &TilePixel, numbers: &mut PixelSample| {
+                let (offset, lens) = (numbers.pair().map(tent), numbers.pair());
+                let at = [window.x + p.x as u32, window.y + p.y as u32];
+                self.film.ray(&self.camera, at, offset, lens)
+            };
+            let shadows = |p: &TilePixel| self.places.shadows(first_place + p.place, by_power);
+            for k in 0..BATCH {
+                let learn = |p: &TilePixel, lamp: usize, light: f64| lessons.add(p.place, lamp, light);
+                tile.sample(&self.estimator, &before, k, shadows, ray, &mut seen, learn);
+            }
+            for (p, seen) in pixels.iter().zip(&seen) {
+                sums[sums_of(p)].add(seen);
+            }
+        }
+        (rows_of_places.start, lessons)
+    }
+}
+
+/// Cuts the rows of a window into bands as high as a tile; the first is lower by `above` rows.
+fn bands(pixels: &mut [PixelSums], width: usize, above: usize) -> Vec<Band<'_>> {
+    let (mut rest, mut row, mut bands) = (pixels, 0, Vec::new());
+    while !rest.is_empty() {
+        let height = if row == 0 { SIDE - above } else { SIDE };
+        let (sums, others) = rest.split_at_mut((height * width).min(rest.len()));
+        let end = row + sums.len() / width;
+        bands.push(Band { rows: row..end, sums });
+        (rest, row) = (others, end);
+    }
+    bands
 }

@@ -25,6 +25,11 @@ const MOST_MET: u32 = 32;
 const NARROW: f64 = 3.0;
 /// Pairs of numbers that each met surface may draw.
 const PAIRS: u64 = 64;
+/// So many times what is expected of all gather rays of a point, one may bring: a path that found a lamp by way of a
+/// mirror or of a narrow lobe would be a bright dot, or a square where pixels share it.
+const FIREFLY: f64 = 32.0;
+/// Of the mean irradiance, what is expected everywhere.
+const DIM: f64 = 0.05;
 /// The least probability with which a lobe behind the gather ray is followed.
 const LEAST_SURVIVAL: f64 = 0.05;
 
@@ -34,6 +39,8 @@ pub(super) struct Estimator<'a> {
     solution: &'a Solution,
     reconstruction: Reconstruction<'a>,
     pub lights: Lights<'a>,
+    /// Over area, luminance, W·m⁻².
+    mean_irradiance: f64,
 }
 
 /// What a camera ray found.
@@ -55,6 +62,8 @@ pub(super) struct Point {
     pub brdf: Towards,
     /// Of the way to the eye.
     pub throughput: Rgb,
+    /// The most luminance that one gather ray may bring to the eye: many times what the solution expects of all.
+    pub limit: f64,
 }
 
 /// What the gather ray of a point found.
@@ -86,7 +95,8 @@ struct Before<'s> {
 impl<'a> Estimator<'a> {
     pub fn new(scene: &'a PatchScene, solution: &'a Solution) -> Self {
         let lights = Lights::new(scene);
-        Self { scene, solution, reconstruction: Reconstruction::new(scene, solution), lights }
+        let mean_irradiance = solution.arriving_power(scene).luminance() / scene.total_area();
+        Self { scene, solution, reconstruction: Reconstruction::new(scene, solution), lights, mean_irradiance }
     }
 
     /// How lamps are chosen where nothing is known of a place.
@@ -116,7 +126,11 @@ impl<'a> Estimator<'a> {
                 Step::End => break,
                 Step::Scatter(factor) => {
                     let brdf = vertex.scatter.brdf.towards(vertex.normal, wo);
-                    sight.point = Some(Point { vertex, brdf, throughput: throughput * factor });
+                    let throughput = throughput * factor;
+                    let expected = self.solution.irradiance(patch).luminance().max(DIM * self.mean_irradiance) / PI;
+                    let albedo = (throughput * vertex.scatter.brdf.albedo(vertex.normal.dot(wo).max(0.0))).luminance();
+                    let limit = FIREFLY * expected * albedo;
+                    sight.point = Some(Point { vertex, brdf, throughput, limit });
                     break;
                 }
                 Step::On(way) => way,

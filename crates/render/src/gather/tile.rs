@@ -21,6 +21,8 @@ pub(super) const SIDE: usize = 4;
 pub(super) const PIXELS: usize = SIDE * SIDE;
 /// Far ends count as far from so many times the distance between the points that share them.
 const FAR: f64 = 4.0;
+/// Lamps in mirrors and behind glass may bring so many times more than other far ends: they are the caustics.
+const CAUSTIC: f64 = 8.0;
 /// Cosine between normals of points that share.
 const SAME_NORMAL: f64 = 0.85;
 /// Rise over run of points that share.
@@ -48,30 +50,33 @@ pub(super) struct Tile<'t> {
 /// A pixel of a tile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TilePixel {
-    /// Column and row on the whole film, and their number there.
+    /// Column and row in the window, and the number on the whole film.
     pub x: usize,
     pub y: usize,
     pub number: u64,
-    /// Its place in the tile.
+    /// Where it is in the tile.
     pub slot: usize,
+    /// The place of the film that it belongs to, as those count who learn.
+    pub place: usize,
 }
 
 impl Tile<'_> {
-    /// Sample `sample` of every pixel, the tile's own after `first` being number `k`: `ray` gives a camera ray of the world.
-    /// Adds to `seen`; `learn` is told what which lamp gave.
-    pub fn sample(
+    /// Sample `k` of a batch for every pixel, which had so many `before`: `ray` gives a camera ray of the world. Adds to
+    /// `seen`; `learn` is told what which lamp gave.
+    pub fn sample<'s>(
         &self,
         estimator: &Estimator,
-        sample: u32,
+        before: &[u32],
         k: u32,
-        shadows: Shadows,
+        shadows: impl Fn(&TilePixel) -> Shadows<'s>,
         ray: impl Fn(&TilePixel, &mut PixelSample) -> Option<(DVec3, DVec3)>,
         seen: &mut [Seen],
-        mut learn: impl FnMut(usize, f64),
+        mut learn: impl FnMut(&TilePixel, usize, f64),
     ) {
         let mut work = [Work::default(); PIXELS];
         for (n, pixel) in self.pixels.iter().enumerate() {
-            let mut numbers = PixelSample::new(self.seed, pixel.number, sample);
+            let mut numbers = PixelSample::new(self.seed, pixel.number, before[n] + k);
+            let shadows = shadows(pixel);
             // Where the camera sees nothing, as beyond a fisheye's circle, the pixel stays black.
             let Some((origin, direction)) = ray(pixel, &mut numbers) else { continue };
             let work = &mut work[n];
@@ -80,7 +85,7 @@ impl Tile<'_> {
             let (light, lamp) = estimator.lit(point, shadows, &mut numbers);
             work.direct = light;
             if let Some(lamp) = lamp {
-                learn(lamp, light.luminance());
+                learn(pixel, lamp, light.luminance());
             }
             let u = net_point(mix(self.seed ^ mix(self.number ^ 0x7113_5EED)), dealt(self.first + k, pixel.slot));
             work.gathered = estimator.gather(point, u, shadows, &mut numbers);
@@ -139,12 +144,12 @@ fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
         let Gathered { direction, density, emitted, scattered, other } = gathered;
         let own = reflected(&point, direction) / density;
         work[i].direct += own * emitted;
-        work[i].indirect += own * other;
+        work[i].indirect += limited(&point, own * other, CAUSTIC);
         let Some((radiance, end, normal)) = scattered else { continue };
         let nearest = |n: usize| work[n].sight.point.map_or(f64::INFINITY, |p| p.vertex.point.distance(end));
         let is_far = members(group).map(nearest).fold(f64::INFINITY, f64::min) > FAR * reach;
         if !is_far || group.count_ones() == 1 {
-            work[i].indirect += own * radiance;
+            work[i].indirect += limited(&point, own * radiance, 1.0);
             continue;
         }
         if radiance.is_black() {
@@ -165,10 +170,17 @@ fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
         }
         if densities > 0.0 {
             for j in members(group) {
-                work[j].indirect += gives[j] * radiance / densities;
+                let Some(point) = &work[j].sight.point else { continue };
+                work[j].indirect += limited(point, gives[j] * radiance / densities, 1.0);
             }
         }
     }
+}
+
+/// What a gather ray brings, if that is not beyond all expectation.
+fn limited(point: &Point, light: Rgb, times: f64) -> Rgb {
+    let (luminance, limit) = (light.luminance(), times * point.limit);
+    if luminance > limit { light * (limit / luminance) } else { light }
 }
 
 /// Factor of what a point reflects to the eye of the radiance from `direction`: throughput · f_r · cosine.

@@ -1,0 +1,106 @@
+//! What is known of places of the film: which lamps light them, and how noisy they are.
+//!
+//! A place is a square of pixels. Which lamps light it, and how much of them gets there, is learnt from the shadow rays
+//! themselves, pass by pass; a pass looks at what earlier ones learnt, so that threads change nothing.
+
+use std::ops::Range;
+
+use crate::direct::Shadows;
+use crate::film::Crop;
+use crate::lights::{Choice, Lights};
+
+/// Pixels along a side of a place.
+pub(super) const EDGE: usize = 16;
+/// Shadow rays before a place trusts what it has learnt.
+const LESSONS: u64 = 512;
+/// The share of shadow rays that go by power all the same: what was overlooked is found.
+const BY_POWER: f64 = 0.2;
+
+/// The places of a window of the film, row by row.
+pub(super) struct Places {
+    window: Crop,
+    columns: usize,
+    rows: usize,
+    lamps: usize,
+    /// Per place and lamp: Σ of the light that it gave; per place, the number of shadow rays.
+    lessons: Lessons,
+    choices: Vec<Option<Choice>>,
+}
+
+/// What shadow rays taught of some places.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lessons {
+    given: Vec<f64>,
+    rays: Vec<u64>,
+}
+
+impl Places {
+    pub fn new(window: Crop, lights: &Lights) -> Self {
+        let count = |pixels: u32| (pixels as usize).div_ceil(EDGE);
+        let (columns, rows, lamps) = (count(window.width), count(window.height), lights.len());
+        let lessons = Lessons::new(columns * rows, lamps);
+        Self { window, columns, rows, lamps, lessons, choices: vec![None; columns * rows] }
+    }
+
+    /// Columns and rows of places.
+    pub fn size(&self) -> (usize, usize) {
+        (self.columns, self.rows)
+    }
+
+    /// The place of a pixel of the window.
+    pub fn of(&self, x: usize, y: usize) -> usize {
+        y / EDGE * self.columns + x / EDGE
+    }
+
+    /// Columns and rows of the window that belong to a place.
+    pub fn pixels(&self, place: usize) -> [Range<usize>; 2] {
+        let range = |k: usize, end: u32| k * EDGE..((k + 1) * EDGE).min(end as usize);
+        [range(place % self.columns, self.window.width), range(place / self.columns, self.window.height)]
+    }
+
+    /// How shadow rays choose lamps there; `otherwise` where too little was learnt.
+    pub fn shadows<'s>(&'s self, place: usize, otherwise: Shadows<'s>) -> Shadows<'s> {
+        self.choices[place].as_ref().map_or(otherwise, |choice| Shadows { choice, candidates: 1 })
+    }
+
+    /// Nothing learnt yet of the places in so many rows.
+    pub fn lessons_of(&self, rows: Range<usize>) -> Lessons {
+        Lessons::new(self.columns * rows.len(), self.lamps)
+    }
+
+    /// Adds what was learnt in places from the first of `row` on.
+    pub fn learn(&mut self, row: usize, lessons: &Lessons) {
+        let first = row * self.columns;
+        let given = self.lessons.given[first * self.lamps..].iter_mut();
+        given.zip(&lessons.given).for_each(|(sum, more)| *sum += more);
+        self.lessons.rays[first..].iter_mut().zip(&lessons.rays).for_each(|(sum, more)| *sum += more);
+    }
+
+    /// Makes choices of what was learnt.
+    pub fn conclude(&mut self, lights: &Lights) {
+        let power = lights.by_power();
+        for (place, choice) in self.choices.iter_mut().enumerate() {
+            let given = &self.lessons.given[place * self.lamps..(place + 1) * self.lamps];
+            let total: f64 = given.iter().sum();
+            if self.lessons.rays[place] < LESSONS || !(total > 0.0 && total.is_finite()) {
+                continue;
+            }
+            let weight =
+                |(lamp, given): (usize, &f64)| BY_POWER * power.probability(lamp) + (1.0 - BY_POWER) * given / total;
+            *choice = Choice::new(&given.iter().enumerate().map(weight).collect::<Vec<f64>>());
+        }
+    }
+}
+
+impl Lessons {
+    fn new(places: usize, lamps: usize) -> Self {
+        Self { given: vec![0.0; places * lamps], rays: vec![0; places] }
+    }
+
+    /// A shadow ray of a place brought so much light of a lamp.
+    pub fn add(&mut self, place: usize, lamp: usize, light: f64) {
+        let lamps = self.given.len() / self.rays.len();
+        self.given[place * lamps + lamp] += light;
+        self.rays[place] += 1;
+    }
+}
