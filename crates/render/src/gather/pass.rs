@@ -147,7 +147,7 @@ impl Gather<'_> {
         let lessons: Vec<(usize, Lessons)> = bands(&mut pixels, width, above)
             .into_par_iter()
             .enumerate()
-            .map(|(number, band)| this.shoot(band, number, lie, left, is_open))
+            .map(|(number, band)| this.shoot(band, number == 0, left, is_open))
             .collect();
         self.pixels = pixels;
         for (row, lessons) in &lessons {
@@ -159,8 +159,7 @@ impl Gather<'_> {
     fn shoot(
         &self,
         band: Band,
-        number: usize,
-        lie: usize,
+        is_first: bool,
         left: usize,
         is_open: &(dyn Fn(usize) -> bool + Sync),
     ) -> (usize, Lessons) {
@@ -177,22 +176,16 @@ impl Gather<'_> {
             let pixels: Vec<TilePixel> = (0..PIXELS)
                 .filter_map(|slot| {
                     let x = (column * SIDE + slot % SIDE).checked_sub(left).filter(|x| *x < width)?;
-                    let y = rows.start + (slot / SIDE).checked_sub(if number == 0 { first_row } else { 0 })?;
+                    let y = rows.start + (slot / SIDE).checked_sub(if is_first { first_row } else { 0 })?;
                     let place = (y < rows.end).then(|| self.places.of(x, y)).filter(|p| is_open(*p))?;
                     let at = [window.x + x as u32, window.y + y as u32];
-                    Some(TilePixel { x, y, number: self.film.number(at), slot, place: place - first_place })
+                    Some(TilePixel { x, y, number: self.film.number(at), place: place - first_place })
                 })
                 .collect();
             if pixels.is_empty() {
                 continue;
             }
-            let tile = Tile {
-                // Tiles that lie alike are sequences of their own.
-                number: ((number as u64) << 32 | column as u64) << 4 | lie as u64,
-                pixels: &pixels,
-                seed: self.seed,
-                first: self.batches / (SIDE * SIDE) as u32 * BATCH,
-            };
+            let tile = Tile { pixels: &pixels, seed: self.seed };
             let mut seen = [Seen::default(); PIXELS];
             let sums_of = |p: &TilePixel| (p.y - rows.start) * width + p.x;
             let before: Vec<u32> = pixels.iter().map(|p| sums[sums_of(p)].rays()).collect();

@@ -19,6 +19,8 @@ use crate::sums::Seen;
 pub(super) const SIDE: usize = 4;
 /// Pixels of a tile.
 pub(super) const PIXELS: usize = SIDE * SIDE;
+/// More squares of pixels than a row of a film has.
+const MOST_SQUARES: u64 = 1 << 32;
 /// Far ends count as far from so many times the distance between the points that share them.
 const FAR: f64 = 4.0;
 /// Lamps in mirrors and behind glass may bring so many times more than other far ends: they are the caustics.
@@ -39,12 +41,8 @@ struct Work {
 
 /// The pixels of a tile: their rays, and where sums go.
 pub(super) struct Tile<'t> {
-    /// A number of its own.
-    pub number: u64,
     pub pixels: &'t [TilePixel],
     pub seed: u64,
-    /// Samples that tiles in this place had before.
-    pub first: u32,
 }
 
 /// A pixel of a tile.
@@ -54,8 +52,6 @@ pub(super) struct TilePixel {
     pub x: usize,
     pub y: usize,
     pub number: u64,
-    /// Where it is in the tile.
-    pub slot: usize,
     /// The place of the film that it belongs to, as those count who learn.
     pub place: usize,
 }
@@ -87,7 +83,10 @@ impl Tile<'_> {
             if let Some(lamp) = lamp {
                 learn(pixel, lamp, light.luminance());
             }
-            let u = net_point(mix(self.seed ^ mix(self.number ^ 0x7113_5EED)), dealt(self.first + k, pixel.slot));
+            // Wherever tiles lie now, a pixel's directions are those of one square of pixels: its own are even in any case.
+            let square = (pixel.y / SIDE) as u64 * MOST_SQUARES + (pixel.x / SIDE) as u64;
+            let slot = pixel.y % SIDE * SIDE + pixel.x % SIDE;
+            let u = net_point(mix(self.seed ^ mix(square)), dealt(before[n] + k, slot));
             work.gathered = estimator.gather(point, u, shadows, &mut numbers);
         }
         self.share(&mut work);
@@ -120,7 +119,7 @@ impl Tile<'_> {
     }
 }
 
-/// The point of the tile's sequence that sample `k` of the pixel in `slot` gets: each sample's sixteen points are an even
+/// The point of a square's sequence that sample `k` of the pixel in `slot` gets: each sample's sixteen points are an even
 /// set, and so are a pixel's own points of sixteen samples.
 ///
 /// The low four bits of the index decide the first digits of the first coordinate, and those of the second together with
