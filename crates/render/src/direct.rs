@@ -19,13 +19,14 @@ pub(crate) struct Shadows<'a> {
     pub candidates: u32,
 }
 
-/// Weight of a sample of density `a` that might have been found with density `b`: the power heuristic with exponent 2
-/// (Veach and Guibas 1995), since one of the two is most often the far better one here.
+/// Weights of a shadow ray and of the BRDF's own ray in a direction that have these densities: the power heuristic with
+/// exponent 2 (Veach and Guibas 1995), since one of the two is most often the far better one here.
 #[inline]
-pub(crate) fn power_heuristic(a: f64, b: f64) -> f64 {
+pub(crate) fn weights(shadow_ray: f64, brdf: f64) -> [f64; 2] {
     // Squares of very large densities are beyond numbers; their ratio is not.
-    let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
+    let ratio = brdf / shadow_ray;
+    let shadow_ray = 1.0 / (1.0 + ratio * ratio);
+    [shadow_ray, 1.0 - shadow_ray]
 }
 
 /// One sample of the radiance that `brdf` reflects at `vertex` of light straight from what emits, and the lamp that it
@@ -50,7 +51,7 @@ pub(crate) fn direct(
             continue;
         }
         let (a, b) = (f64::from(candidates) * light.density, brdf.pdf(light.towards));
-        let density = a / power_heuristic(a, b);
+        let density = a / weights(a, b)[0];
         let gives = light.radiance * brdf.eval(light.towards) * (cosine / density);
         let luminance = gives.luminance();
         if luminance > 0.0 {

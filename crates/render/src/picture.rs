@@ -13,7 +13,7 @@ use twinray_scene::sample::Stream;
 use twinray_scene::{Camera, PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Shadows, direct, power_heuristic};
+use crate::direct::{Shadows, direct, weights};
 use crate::film::{Crop, Film};
 use crate::image::Image;
 use crate::lights::Lights;
@@ -258,7 +258,7 @@ impl View<'_> {
         let Some(wi) = brdf.lobe_sample(*n, wo, u).filter(above) else { return nothing };
         let density = brdf.lobe_pdf(*n, wo, wi);
         let weight = brdf.lobe_eval(*n, wi, wo) * (n.dot(wi) / density);
-        let balanced = |other: f64| power_heuristic(density, f64::from(LAMPS) * other);
+        let balanced = |other: f64| weights(f64::from(LAMPS) * other, density)[1];
         let Some(far) = scene.trace_from(*patch, *point, wi) else {
             let sky = weight * scene.environment().map_or(Rgb::BLACK, |e| e.radiance(wi));
             return match &self.lamps {

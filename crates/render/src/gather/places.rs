@@ -13,8 +13,8 @@ use crate::lights::{Choice, Lights};
 pub(super) const EDGE: usize = 16;
 /// Shadow rays before a place trusts what it has learnt.
 const LESSONS: u64 = 512;
-/// The share of shadow rays that go by power all the same: what was overlooked is found.
-const BY_POWER: f64 = 0.2;
+/// The share of shadow rays that go by power and evenly all the same: what was overlooked is found.
+const UNLEARNT: f64 = 0.2;
 
 /// The places of a window of the film, row by row.
 pub(super) struct Places {
@@ -85,8 +85,10 @@ impl Places {
             if self.lessons.rays[place] < LESSONS || !(total > 0.0 && total.is_finite()) {
                 continue;
             }
-            let weight =
-                |(lamp, given): (usize, &f64)| BY_POWER * power.probability(lamp) + (1.0 - BY_POWER) * given / total;
+            let weight = |(lamp, given): (usize, &f64)| {
+                let unlearnt = 0.5 * (power.probability(lamp) + 1.0 / self.lamps as f64);
+                UNLEARNT * unlearnt + (1.0 - UNLEARNT) * given / total
+            };
             *choice = Choice::new(&given.iter().enumerate().map(weight).collect::<Vec<f64>>());
         }
     }

@@ -9,7 +9,7 @@ use twinray_scene::sample::PixelSample;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Shadows, direct, power_heuristic};
+use crate::direct::{Shadows, direct, weights};
 use crate::lights::Lights;
 use crate::picture::first_side;
 use crate::reconstruct::Reconstruction;
@@ -255,7 +255,7 @@ impl<'a> Estimator<'a> {
     /// Weight of what a path met that a shadow ray could have found with density `light`.
     fn weight(&self, before: &Before, light: impl Fn(Shadows) -> f64) -> f64 {
         match before.lit {
-            Some(by) => power_heuristic(before.density, f64::from(by.candidates) * light(by)),
+            Some(by) => weights(f64::from(by.candidates) * light(by), before.density)[1],
             None => 1.0,
         }
     }
