@@ -79,10 +79,25 @@ impl Specular {
 
     /// Mirror reflectance and transmittance for light at the given cosine, from `inside` the body or from outside.
     pub fn throughput(&self, cosine: f64, inside: bool) -> [Rgb; 2] {
-        let Some(outside) = self.outside(cosine, inside) else { return [Rgb::WHITE, Rgb::BLACK] };
+        let Some(outside) = self.outside(cosine, inside) else {
+            // All that the BRDF beside does not scatter: a rough body still has its lobe there.
+            let total = self.coat.map_or(self.transmittance, |g| (Rgb::WHITE - g.albedo(cosine)).map(|c| c.max(0.0)));
+            return [total, Rgb::BLACK];
+        };
         let reflected = self.mirror[0].lerp(self.mirror[1], schlick(outside));
         let coat = self.coat.map_or(0.0, |g| g.coat_albedo(outside));
-        [reflected, self.transmittance * (1.0 - coat)]
+        let transmitted = self.transmittance * (1.0 - coat);
+        let room = self.room(outside, (reflected + transmitted).max_channel());
+        [reflected * room, transmitted * room]
+    }
+
+    /// What has to be taken from the light that goes on, lest a body gives more than it gets: within it, the BRDF beside
+    /// is that of another angle. For both ways the same, so that they stay reciprocal.
+    fn room(&self, outside: f64, going: f64) -> f64 {
+        let (Some(coat), Some(_)) = (self.coat, self.volume) else { return 1.0 };
+        let within = (1.0 - (1.0 - outside * outside) / (self.ior * self.ior)).max(0.0).sqrt();
+        let scattered = coat.albedo(within).max_channel();
+        if going + scattered > 1.0 { ((1.0 - scattered) / going).max(0.0) } else { 1.0 }
     }
 
     /// Both together: the share of arriving light that goes on.
@@ -182,13 +197,14 @@ pub fn mirrored(n: DVec3, wo: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Brdf, Detail, Passing, Scatter};
     use super::*;
 
     fn glass(volume: Option<Volume>) -> Specular {
         let coat = Ggx::new(Rgb::WHITE, 0.0, 0.0, 1.0, Rgb::WHITE, 1.5);
         Specular {
             mirror: [Rgb::grey(0.04), Rgb::WHITE],
-            coat: Some(coat.sharp()),
+            coat: Some(coat.without(1.0).sharp()),
             transmittance: Rgb::WHITE,
             ior: 1.5,
             volume,
@@ -215,6 +231,34 @@ mod tests {
         // Beyond the critical angle, 41.8°, all is reflected.
         assert_eq!(g.refract(-n, DVec3::new(0.7, 0.0, -(1.0f64 - 0.49).sqrt()), true), None);
         assert_eq!(g.throughput(0.7, true), [Rgb::WHITE, Rgb::BLACK]);
+    }
+
+    /// From within and from outside, beyond the critical angle and before it: what goes on and what is scattered are
+    /// no more than what arrives, however rough the body and whatever share of it transmits.
+    #[test]
+    fn bodies_create_no_light() {
+        let volume = Some(Volume { attenuation: Rgb::BLACK });
+        for roughness in [0.0, 0.05, 0.2, 0.5, 1.0] {
+            for share in [0.3, 1.0] {
+                let ggx = Brdf::Ggx(Ggx::new(Rgb::WHITE, 0.0, roughness, 1.0, Rgb::WHITE, 1.5));
+                let lambertian = Brdf::Lambertian { reflectance: Rgb::WHITE };
+                for (brdf, detail) in [(ggx, Detail::Patches), (ggx, Detail::Picture), (lambertian, Detail::Patches)] {
+                    let passing = Passing { share, color: Rgb::WHITE, ior: 1.5, volume };
+                    let scatter = Scatter::new(brdf, Some(passing), detail);
+                    let specular = scatter.specular.expect("light passes");
+                    for k in 1..=100 {
+                        let cosine = f64::from(k) / 100.0;
+                        for inside in [false, true] {
+                            let sum = specular.passed(cosine, inside) + scatter.brdf.albedo(cosine);
+                            // The albedo's table is interpolated.
+                            let text =
+                                format!("roughness {roughness}, share {share}, cosine {cosine}, {inside}: {sum:?}");
+                            assert!(sum.max_channel() < 1.0 + 0.004, "{text}");
+                        }
+                    }
+                }
+            }
+        }
     }
 
     #[test]
