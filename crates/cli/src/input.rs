@@ -189,6 +189,9 @@ fn scale(scene: &mut Scene, metres: f64) {
         instance.transform.matrix3 *= metres;
         instance.transform.translation *= metres;
     }
+    // What a coefficient is per metre follows the metre.
+    let volumes = scene.materials.iter_mut().filter_map(|m| m.transmission.as_mut()?.volume.as_mut());
+    volumes.for_each(|v| v.attenuation = v.attenuation / metres);
     for camera in &mut scene.cameras {
         camera.eye *= metres;
         if let Projection::Orthographic { half_height } = &mut camera.projection {
@@ -245,4 +248,20 @@ pub fn pick_camera<'a>(cameras: &'a [Camera], wish: Option<&str>) -> anyhow::Res
         let names: Vec<_> = cameras.iter().enumerate().map(|(i, c)| format!("{i} \"{}\"", c.name)).collect();
         anyhow!("--camera {wish}: no such camera; the scene has {}", names.join(", "))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use twinray::scene::{Material, Rgb, Scene, Transmission, Volume};
+
+    /// What halves light within a millimetre of the file's unit does so within a millimetre of the world.
+    #[test]
+    fn attenuation_follows_the_unit() {
+        let volume = Some(Volume { attenuation: Rgb::new(0.5, 1.0, 0.0) });
+        let transmission = Some(Transmission { factor: 1.0, texture: None, volume });
+        let mut scene = Scene { materials: vec![Material { transmission, ..Material::default() }], ..Scene::default() };
+        super::scale(&mut scene, 0.001);
+        let attenuation = scene.materials[0].transmission.as_ref().unwrap().volume.unwrap().attenuation;
+        assert_eq!(attenuation, Rgb::new(500.0, 1000.0, 0.0));
+    }
 }

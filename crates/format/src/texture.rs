@@ -56,7 +56,7 @@ impl Pictures {
         index: usize,
         prefix: &str,
         limits: &Limits,
-        texel: impl Fn([u8; 4]) -> [u8; 4],
+        mut texel: impl FnMut([u8; 4]) -> [u8; 4],
     ) -> Option<usize> {
         let source = self.images.get(index)?.clone();
         let texels = u64::from(source.width) * u64::from(source.height);
@@ -69,6 +69,25 @@ impl Pictures {
         self.brightest.push(brightest_texel(&image));
         self.images.push(Arc::new(image));
         Some(self.images.len() - 1)
+    }
+
+    /// The colours of picture `colour`, or white, with picture `mask` as alpha: its own alpha channel if that says
+    /// anything, else its brightness. `None` where the sizes differ or the limits are reached.
+    pub(crate) fn with_mask(&mut self, colour: Option<usize>, mask: usize, limits: &Limits) -> Option<usize> {
+        let mask_image = self.images.get(mask)?.clone();
+        let masks = mask_image.rgba.as_chunks::<4>().0;
+        let by_alpha = masks.iter().any(|t| t[3] < 255);
+        let alpha = |t: &[u8; 4]| if by_alpha { t[3] } else { t[1] };
+        let base = self.images.get(colour.unwrap_or(mask))?.clone();
+        if (base.width, base.height) != (mask_image.width, mask_image.height) {
+            return None;
+        }
+        let mut alphas = masks.iter().map(alpha);
+        let masked = |[r, g, b, _]: [u8; 4]| {
+            let a = alphas.next().unwrap_or(255);
+            if colour.is_some() { [r, g, b, a] } else { [255, 255, 255, a] }
+        };
+        self.derive(colour.unwrap_or(mask), "mask of ", limits, masked)
     }
 
     /// Largest linear value of each channel of picture `index`.

@@ -110,7 +110,7 @@ impl Reader<'_, '_> {
             Some(extension) => self.specular_glossiness(&extension, &name),
             None => {
                 let pbr = element.get("pbrMetallicRoughness").unwrap_or_else(|| nothing.clone());
-                self.metallic_roughness(element, &pbr, &name, transmission.is_some())
+                self.metallic_roughness(element, &pbr, &name, transmission.as_ref())
             }
         };
 
@@ -127,9 +127,18 @@ impl Reader<'_, '_> {
         Material { name, surface, emission, emission_texture, two_sided, opacity, transmission, normal_map }
     }
 
-    fn metallic_roughness(&mut self, element: &Element<'_>, pbr: &Element<'_>, name: &str, transmits: bool) -> Surface {
-        let base_color = self.base_color(pbr, ["baseColorFactor", "baseColorTexture"], name);
+    fn metallic_roughness(
+        &mut self,
+        element: &Element<'_>,
+        pbr: &Element<'_>,
+        name: &str,
+        transmission: Option<&Transmission>,
+    ) -> Surface {
         let metallic = self.number(pbr, "metallicFactor", 1.0, 0.0..=1.0);
+        let clear = transmission.is_some_and(|t| t.factor == 1.0 && t.texture.is_none());
+        // A base that transmits everything reflects nothing, and clear glass is no grey one.
+        let most = if clear && metallic == 0.0 { 1.0 } else { self.context.limits.max_reflectance };
+        let base_color = self.base_color(pbr, ["baseColorFactor", "baseColorTexture"], most, name);
         let roughness = self.number(pbr, "roughnessFactor", 1.0, 0.0..=1.0);
         let extension = element.extension("KHR_materials_specular");
         let (specular, specular_color) = match &extension {
@@ -143,7 +152,7 @@ impl Reader<'_, '_> {
             return phong;
         }
         // Where light passes, roughness means something without a lobe, too.
-        if specular == 0.0 && metallic == 0.0 && (!transmits || roughness == 0.0) {
+        if specular == 0.0 && metallic == 0.0 && (transmission.is_none() || roughness == 0.0) {
             return Surface::Lambertian { reflectance: base_color };
         }
         Surface::MetallicRoughness {
@@ -160,14 +169,13 @@ impl Reader<'_, '_> {
     }
 
     /// Factor and texture of a base colour, below the limit of reflectance.
-    fn base_color(&mut self, owner: &Element<'_>, [factor, texture]: [&str; 2], name: &str) -> Texel {
+    fn base_color(&mut self, owner: &Element<'_>, [factor, texture]: [&str; 2], limit: f64, name: &str) -> Texel {
         let color = self.colour(owner, factor, [1.0; 4], 1.0);
         let mut texel = Texel {
             factor: Rgb::new(color[0], color[1], color[2]),
             alpha: color[3],
             texture: self.texture(owner.get(texture)),
         };
-        let limit = self.context.limits.max_reflectance;
         self.materials.clamp.apply(&mut texel, &self.materials.pictures, limit, name);
         texel
     }
@@ -177,12 +185,12 @@ impl Reader<'_, '_> {
     /// as that extension has it.
     fn specular_glossiness(&mut self, extension: &Element<'_>, name: &str) -> Surface {
         self.materials.converted.push(name.to_owned());
-        let base_color = self.base_color(extension, ["diffuseFactor", "diffuseTexture"], name);
+        let limit = self.context.limits.max_reflectance;
+        let base_color = self.base_color(extension, ["diffuseFactor", "diffuseTexture"], limit, name);
         let specular = Rgb::from_array(self.colour(extension, "specularFactor", [1.0; 3], 1.0));
         let glossiness = self.number(extension, "glossinessFactor", 1.0, 0.0..=1.0);
         let texture = self.texture(extension.get("specularGlossinessTexture"));
         let mut lobe = Texel { texture, ..Texel::constant(specular) };
-        let limit = self.context.limits.max_reflectance;
         self.materials.clamp.apply(&mut lobe, &self.materials.pictures, limit, name);
         // Glossiness is in the alpha channel; roughness has to be in a green one.
         let rough = |[_, _, _, alpha]: [u8; 4]| {

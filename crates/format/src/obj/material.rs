@@ -1,11 +1,15 @@
-//! MTL materials to ours: Kd to Lambertian or Phong, Ke to emission, d below 1 to glass.
+//! MTL materials to ours: Kd to Lambertian or Phong, Ke to emission, illumination models of glass to glass.
 //!
+//! `d` is what its specification calls dissolving: a share of the surface that is not there. Where the illumination
+//! model says glass (4 and 9, a pane; 6 and 7, a body that refracts) it is the share that does not transmit.
 //! Every material is two-sided, because OBJ has no notion of sides; emission is still that of the front, the side
 //! of the author's normals. Not here: text (`mtl`), pixels (`texture`).
 
 use std::collections::HashMap;
 
-use twinray_scene::{Material, Opacity, Rgb, Surface, Texel, TextureRef, Transmission, Wrap};
+use twinray_scene::{
+    Material, NormalMap, Opacity, Rgb, Surface, Texel, TextureRef, TextureTransform, Transmission, Volume, Wrap,
+};
 
 use super::mtl::{Entry, Map};
 use crate::context::Context;
@@ -28,7 +32,7 @@ pub(super) struct Materials {
     clamp: Clamp,
     /// Ks brought down so that no more light leaves than arrives.
     dimmed: Vec<String>,
-    transmissive: Vec<String>,
+    bumpy: Vec<String>,
     unknown: Vec<String>,
     from_ambient: bool,
 }
@@ -53,7 +57,7 @@ impl Materials {
             files: HashMap::new(),
             clamp: Clamp::default(),
             dimmed: Vec::new(),
-            transmissive: Vec::new(),
+            bumpy: Vec::new(),
             unknown: Vec::new(),
             from_ambient,
         }
@@ -93,7 +97,7 @@ impl Materials {
             }
         };
         report(&self.dimmed, format!("Ks brought down so that Kd + Ks is at most {limit}"));
-        report(&self.transmissive, "d below 1 lets light straight through, without refraction or tint".to_owned());
+        report(&self.bumpy, "bump maps are ignored; normal maps (norm) are read".to_owned());
         report(&self.unknown, format!("not found in any MTL file, {MISSING_REFLECTANCE} grey is used"));
         if self.from_ambient {
             let lights = self.list.iter().filter(|m| !m.emission.is_black());
@@ -118,20 +122,49 @@ impl Materials {
             context.warn(element, format!("emission {:?} is brought down to {most:e}", emission.to_array()));
             emission = emission.map(|c| c.min(most));
         }
-        let opacity = entry.opacity.unwrap_or(1.0);
-        let transmissive = opacity < 1.0;
-        if transmissive {
-            self.transmissive.push(entry.name.clone());
+        if entry.bump_map.is_some() {
+            self.bumpy.push(entry.name.clone());
         }
+        let normal_map = entry
+            .normal_map
+            .as_ref()
+            .and_then(|map| Some(NormalMap { texture: self.texture(context, map)?, scale: map.strength }));
+        let glass = glass(entry);
+        let mut surface = match &glass {
+            Some(glass) => self.glass_surface(entry, glass),
+            None => self.surface(context, entry, emission),
+        };
+        let opacity = self.opacity(context, entry, &mut surface, glass.is_some());
         Material {
             name: entry.name.clone(),
-            surface: self.surface(context, entry, emission),
+            surface,
             emission,
             emission_texture,
             two_sided: true,
-            opacity: self.mask(context, entry),
-            transmission: transmissive.then_some(Transmission { factor: 1.0 - opacity, texture: None, volume: None }),
-            normal_map: None,
+            opacity,
+            transmission: glass.map(|g| g.transmission),
+            normal_map,
+        }
+    }
+
+    /// Glass reflects by its index of refraction, and what passes has the colour of Tf.
+    fn glass_surface(&mut self, entry: &Entry, glass: &Glass) -> Surface {
+        let mut base_color = Texel::constant(entry.filter.unwrap_or(Rgb::WHITE).map(|c| c.max(0.0)));
+        // What does not transmit has Kd: the two share one base.
+        if glass.transmission.factor < 1.0 && entry.filter.is_none() {
+            base_color = Texel::constant(entry.diffuse.unwrap_or(Rgb::WHITE));
+        }
+        base_color.factor = base_color.factor.map(|c| c.clamp(0.0, 1.0));
+        Surface::MetallicRoughness {
+            base_color,
+            metallic: 0.0,
+            roughness: glass.roughness,
+            metallic_roughness_texture: None,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: Rgb::WHITE,
+            specular_color_texture: None,
+            ior: glass.ior,
         }
     }
 
@@ -166,19 +199,40 @@ impl Materials {
         Surface::Phong { diffuse, specular: kept, exponent: exponent.min(1e6) }
     }
 
-    /// `map_d` is read where it is the alpha of the base colour; other masks have no place in the scene's types.
-    fn mask(&mut self, context: &mut Context<'_>, entry: &Entry) -> Opacity {
-        match &entry.opacity_map {
-            Some(map) if entry.diffuse_map.as_ref().is_some_and(|d| d.file == map.file) => {
-                Opacity::Mask { cutoff: 0.5 }
+    /// `map_d` as a mask, else `d` as the share that is there. A mask from another file than `map_Kd` is put into the
+    /// alpha channel of that picture, or of a white one.
+    fn opacity(&mut self, context: &mut Context<'_>, entry: &Entry, surface: &mut Surface, is_glass: bool) -> Opacity {
+        let base = match surface {
+            Surface::Lambertian { reflectance } => reflectance,
+            Surface::MetallicRoughness { base_color, .. } => base_color,
+            Surface::Phong { diffuse, .. } => diffuse,
+        };
+        let dissolved = entry.opacity.filter(|d| *d < 1.0 && !is_glass).map(|d| d.max(0.0));
+        if let Some(map) = &entry.opacity_map {
+            let same = entry.diffuse_map.as_ref().is_some_and(|d| d.file == map.file);
+            if same && base.texture.is_some() || self.masked(context, entry, map, base) {
+                base.alpha = 1.0;
+                return Opacity::Mask { cutoff: 0.5 };
             }
-            Some(_) => {
-                let element = format!("material \"{}\"", entry.name);
-                context.warn(element, "map_d is ignored: it is not the alpha of map_Kd");
-                Opacity::Opaque
-            }
-            None => Opacity::Opaque,
         }
+        let Some(alpha) = dissolved else { return Opacity::Opaque };
+        base.alpha = alpha;
+        Opacity::Blend
+    }
+
+    /// Gives `base` the mask `map`; false, with a warning, if that cannot be.
+    fn masked(&mut self, context: &mut Context<'_>, entry: &Entry, map: &Map, base: &mut Texel) -> bool {
+        let Some(mask) = self.texture(context, map) else { return false };
+        let lies_alike = base.texture.as_ref().is_none_or(|t| (t.wrap, t.transform) == (mask.wrap, mask.transform));
+        let colour = base.texture.as_ref().map(|t| t.image);
+        let image = if lies_alike { self.pictures.with_mask(colour, mask.image, context.limits) } else { None };
+        if let Some(image) = image {
+            base.texture = Some(TextureRef { image, ..mask });
+            return true;
+        }
+        let element = format!("material \"{}\"", entry.name);
+        context.warn(element, "map_d is ignored: it is of another size than map_Kd, lies differently, or is too large");
+        false
     }
 
     fn texture(&mut self, context: &mut Context<'_>, map: &Map) -> Option<TextureRef> {
@@ -188,7 +242,10 @@ impl Materials {
         }
         let image = self.files.get(&map.file).copied().flatten()?;
         let wrap = [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
-        Some(TextureRef { wrap, ..TextureRef::of(image) })
+        // OBJ counts v from below: 1 - v' = s (1 - v) + o.
+        let ([su, sv], [ou, ov]) = (map.scale, map.offset);
+        let transform = TextureTransform { offset: [ou, 1.0 - sv - ov], rotation: 0.0, scale: [su, sv] };
+        Some(TextureRef { wrap, transform, ..TextureRef::of(image) })
     }
 
     fn load(&mut self, context: &mut Context<'_>, map: &Map) -> Option<usize> {
@@ -206,6 +263,38 @@ impl Materials {
         }
     }
 }
+
+/// What makes a material glass.
+struct Glass {
+    transmission: Transmission,
+    ior: f64,
+    roughness: f64,
+}
+
+/// Illumination models 6 and 7 refract; 4 and 9 are called glass, but exporters write them for anything, so that `d` or
+/// `Tf` has to say so, too.
+fn glass(entry: &Entry) -> Option<Glass> {
+    let model = entry.illumination?;
+    let opacity = entry.opacity.unwrap_or(1.0).clamp(0.0, 1.0);
+    let filters = entry.filter.is_some_and(|f| f.max_channel() > 0.0);
+    let refracts = model == 6.0 || model == 7.0;
+    if !refracts && !((model == 4.0 || model == 9.0) && (opacity < 1.0 || filters)) {
+        return None;
+    }
+    // An index of 1 bends nothing: what lies behind such a surface is not its inside.
+    let ior = entry.ior.filter(|n| (1.0..=4.0).contains(n)).unwrap_or(1.5);
+    let volume = (refracts && ior > 1.0).then_some(Volume { attenuation: Rgb::BLACK });
+    let factor = if opacity < 1.0 { 1.0 - opacity } else { 1.0 };
+    // α = √(2/(n + 2)) and α = roughness²; below a width that anybody sees, glass is smooth.
+    let roughness = match entry.exponent {
+        Some(n) if (0.0..ROUGHEST_SMOOTH).contains(&n) && n > 0.0 => (2.0 / (n + 2.0)).powf(0.25),
+        _ => 0.0,
+    };
+    Some(Glass { transmission: Transmission { factor, texture: None, volume }, ior, roughness })
+}
+
+/// Phong exponent from which on glass is smooth. Exporters leave defaults of some hundred where nobody meant anything.
+const ROUGHEST_SMOOTH: f64 = 60.0;
 
 fn is_light(name: &str) -> bool {
     name.to_ascii_lowercase().contains("light")

@@ -20,9 +20,16 @@ pub(super) struct Entry {
     pub(super) exponent: Option<f64>,
     pub(super) opacity: Option<f64>,
     pub(super) illumination: Option<f64>,
+    /// Index of refraction, Ni.
+    pub(super) ior: Option<f64>,
+    /// Colour of what passes, Tf.
+    pub(super) filter: Option<Rgb>,
     pub(super) diffuse_map: Option<Map>,
     pub(super) emission_map: Option<Map>,
     pub(super) opacity_map: Option<Map>,
+    pub(super) normal_map: Option<Map>,
+    /// The file of a height map.
+    pub(super) bump_map: Option<String>,
 }
 
 /// A texture with those of its options that matter.
@@ -30,6 +37,11 @@ pub(super) struct Entry {
 pub(super) struct Map {
     pub(super) file: String,
     pub(super) clamp: bool,
+    /// Added to the coordinates, and before that multiplied with them: options -o and -s.
+    pub(super) offset: [f64; 2],
+    pub(super) scale: [f64; 2],
+    /// Option -bm: how strong bumps are.
+    pub(super) strength: f64,
 }
 
 /// Reads the MTL file `file`.
@@ -65,12 +77,16 @@ fn set(context: &mut Context<'_>, file: &str, entry: &mut Entry, line: &Line<'_>
         "ke" => entry.emission = colour(line)?,
         "ns" => entry.exponent = number()?,
         "illum" => entry.illumination = number()?,
+        "ni" => entry.ior = number()?,
+        "tf" => entry.filter = colour(line)?,
         // `d` wins over `Tr`, its complement: files that give both often have the latter wrong.
         "d" => entry.opacity = line.numbers::<1>(file).map(|[v]| Some(v)).or_else(|_| halo(line))?,
         "tr" if entry.opacity.is_none() => entry.opacity = number()?.map(|v| 1.0 - v),
         "map_kd" => entry.diffuse_map = map(context)?,
         "map_ke" => entry.emission_map = map(context)?,
         "map_d" => entry.opacity_map = map(context)?,
+        "norm" | "map_kn" => entry.normal_map = map(context)?,
+        "bump" | "map_bump" => entry.bump_map = map(context)?.map(|m| m.file),
         _ => {}
     }
     Ok(())
@@ -95,7 +111,8 @@ fn colour(line: &Line<'_>) -> Result<Option<Rgb>, String> {
 
 /// `map_Kd -clamp on -o 0 0 0 wood floor.png`: options first, then a name that may contain spaces.
 fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<Map, String> {
-    let (mut rest, mut clamp) = (line.rest, false);
+    let mut map = Map { file: String::new(), clamp: false, offset: [0.0; 2], scale: [1.0; 2], strength: 1.0 };
+    let mut rest = line.rest;
     while let Some(options) = rest.strip_prefix('-') {
         let (option, others) = first_word(options);
         rest = others;
@@ -105,8 +122,9 @@ fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<M
             word
         };
         match option {
-            "clamp" => clamp = word() == "on",
-            "blendu" | "blendv" | "cc" | "imfchan" | "type" | "texres" | "boost" | "bm" | "colorspace" => {
+            "clamp" => map.clamp = word() == "on",
+            "bm" => map.strength = word().parse().ok().filter(|v: &f64| v.is_finite()).unwrap_or(1.0),
+            "blendu" | "blendv" | "cc" | "imfchan" | "type" | "texres" | "boost" | "colorspace" => {
                 word();
             }
             "mm" => {
@@ -114,16 +132,18 @@ fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<M
                 word();
             }
             "o" | "s" | "t" => {
-                // One to three numbers.
-                for _ in 0..3 {
-                    let (next, others) = first_word(rest);
-                    if next.parse::<f64>().is_err() {
-                        break;
+                let values;
+                (values, rest) = up_to_three_numbers(rest);
+                // What is left out keeps its default.
+                let set = |target: &mut [f64; 2]| target.iter_mut().zip(&values).for_each(|(t, v)| *t = *v);
+                match option {
+                    "o" => set(&mut map.offset),
+                    "s" => set(&mut map.scale),
+                    _ => {
+                        let place = format!("line {}", line.number);
+                        context.warnings.push(file, place, format!("option -t of {} is ignored", line.keyword));
                     }
-                    rest = others;
                 }
-                let place = format!("line {}", line.number);
-                context.warnings.push(file, place, format!("option -{option} of {} is ignored", line.keyword));
             }
             other => return Err(format!("unknown option -{}", other.chars().take(20).collect::<String>())),
         }
@@ -131,7 +151,19 @@ fn parse_map(context: &mut Context<'_>, file: &str, line: &Line<'_>) -> Result<M
     if rest.is_empty() {
         return Err("found no file name".to_owned());
     }
-    Ok(Map { file: rest.to_owned(), clamp })
+    Ok(Map { file: rest.to_owned(), ..map })
+}
+
+/// The numbers at the start of `text`, at most three, and what follows them.
+fn up_to_three_numbers(mut text: &str) -> (Vec<f64>, &str) {
+    let mut numbers = Vec::new();
+    while numbers.len() < 3 {
+        let (word, others) = first_word(text);
+        let Some(number) = word.parse().ok().filter(|v: &f64| v.is_finite()) else { break };
+        numbers.push(number);
+        text = others;
+    }
+    (numbers, text)
 }
 
 /// The text before the first white space and that after it; the former is empty if `text` begins with some.

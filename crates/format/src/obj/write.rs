@@ -2,13 +2,15 @@
 //!
 //! Everything is in world space, so a mesh that is placed twice is written twice. What the format cannot say:
 //! cameras and surroundings are left out, one-sided surfaces become two-sided, metallic-roughness becomes the
-//! Phong lobe of about the same width. Reading is in the sibling modules.
+//! Phong lobe of about the same width, glass loses its attenuation, pictures their turns. Reading is in the sibling modules.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
 use glam::{DMat3, DVec3};
-use twinray_scene::{Instance, Material, Mesh, Opacity, Rgb, Scene, Surface, Texel, TextureRef, Wrap};
+use twinray_scene::{
+    Instance, Material, Mesh, NormalMap, Opacity, Rgb, Scene, Surface, Texel, TextureRef, TextureTransform, Wrap,
+};
 
 use crate::png::encode_rgba;
 
@@ -131,7 +133,7 @@ fn write_material(
         used[texture.image] = true;
         // OBJ has no mirrored tiling.
         let clamp = if texture.wrap == [Wrap::Clamp; 2] { " -clamp on" } else { "" };
-        let _ = writeln!(mtl, "{key}{clamp} {}", picture_name(texture.image));
+        let _ = writeln!(mtl, "{key}{clamp}{} {}", placing(&texture.transform), picture_name(texture.image));
     };
     let (diffuse, specular, exponent) = as_phong(&material.surface);
     colour(mtl, "Kd", diffuse.factor);
@@ -141,19 +143,56 @@ fn write_material(
             map(mtl, "map_d", texture);
         }
     }
-    match exponent {
-        Some(exponent) => {
-            colour(mtl, "Ks", specular);
-            let _ = writeln!(mtl, "Ns {}\nillum 2", Decimal(exponent));
-        }
-        None => mtl.push_str("illum 1\n"),
+    if let Some(exponent) = exponent {
+        colour(mtl, "Ks", specular);
+        let _ = writeln!(mtl, "Ns {}", Decimal(exponent));
     }
+    write_passing(mtl, material, exponent.is_some());
     if !material.emission.is_black() {
         colour(mtl, "Ke", material.emission);
         material.emission_texture.iter().for_each(|t| map(mtl, "map_Ke", t));
     }
-    if material.transmission.is_some() {
-        mtl.push_str("d 0.1\n");
+    if let Some(NormalMap { texture, scale }) = &material.normal_map {
+        map(mtl, &format!("norm -bm {}", Decimal(*scale)), texture);
+    }
+}
+
+/// The illumination model, and what goes with it: that of glass, or the share that is there.
+fn write_passing(mtl: &mut String, material: &Material, has_lobe: bool) {
+    let Some(transmission) = &material.transmission else {
+        let _ = writeln!(mtl, "illum {}", if has_lobe { 2 } else { 1 });
+        if material.opacity == Opacity::Blend {
+            let _ = writeln!(mtl, "d {}", Decimal(base(&material.surface).alpha));
+        }
+        return;
+    };
+    let ior = if let Surface::MetallicRoughness { ior, .. } = material.surface { ior } else { 1.5 };
+    let model = if transmission.volume.is_some() { 7 } else { 4 };
+    let _ = writeln!(mtl, "illum {model}\nNi {}", Decimal(ior));
+    colour(mtl, "Tf", base(&material.surface).factor);
+    if transmission.factor < 1.0 {
+        let _ = writeln!(mtl, "d {}", Decimal(1.0 - transmission.factor));
+    }
+}
+
+/// Options of a map that lies elsewhere. OBJ counts v from below and turns no pictures.
+fn placing(transform: &TextureTransform) -> String {
+    let TextureTransform { offset: [u, v], scale: [su, sv], .. } = *transform;
+    let mut options = String::new();
+    if [su, sv] != [1.0; 2] {
+        let _ = write!(options, " -s {} {} 1", Decimal(su), Decimal(sv));
+    }
+    if [u, 1.0 - sv - v] != [0.0; 2] {
+        let _ = write!(options, " -o {} {} 0", Decimal(u), Decimal(1.0 - sv - v));
+    }
+    options
+}
+
+fn base(surface: &Surface) -> &Texel {
+    match surface {
+        Surface::Lambertian { reflectance } => reflectance,
+        Surface::MetallicRoughness { base_color, .. } => base_color,
+        Surface::Phong { diffuse, .. } => diffuse,
     }
 }
 

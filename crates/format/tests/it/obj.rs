@@ -2,7 +2,7 @@
 
 use glam::dvec3;
 use twinray_format::FormatError;
-use twinray_scene::{Opacity, Rgb, Surface};
+use twinray_scene::{Opacity, Rgb, Surface, TextureRef, Volume};
 
 use crate::support::{assert_says, assert_warns, colour, normal, png, read, read_with, warnings, world_triangles};
 
@@ -62,16 +62,16 @@ fn texture_coordinates_count_from_the_top() {
 }
 
 #[test]
-fn materials_become_lambertian_phong_and_glass() {
+fn materials_become_lambertian_phong_and_veils() {
     let obj = format!(
-        "mtllib my file.mtl\n{TRIANGLE}v 0 0 1\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 2 4\nusemtl lamp\nf 1 3 4\nusemtl glass\nf 2 3 4\n"
+        "mtllib my file.mtl\n{TRIANGLE}v 0 0 1\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 2 4\nusemtl lamp\nf 1 3 4\nusemtl veil\nf 2 3 4\n"
     );
     let mtl = b"newmtl matt\nKd 0.5 0.25 0.125\n\nnewmtl shiny\nKd 0.6 0.2 0.2\nKs 0.5 0.5 0.1\nNs 30\nillum 2\n\
-        newmtl lamp\nKe 10 20 30\n  newmtl glass\n\tKd 1 1 1\nd 0.25\nKs 1 1 1\nNs 100\nillum 1\n";
+        newmtl lamp\nKe 10 20 30\n  newmtl veil\n\tKd 1 1 1\nd 0.25\nKs 1 1 1\nNs 100\nillum 1\n";
     let reading = read_with("a.obj", obj.as_bytes(), &[("my file.mtl", mtl)]).unwrap();
     let materials = &reading.scene.materials;
     let names: Vec<_> = materials.iter().map(|m| m.name.as_str()).collect();
-    assert_eq!(names, ["matt", "shiny", "lamp", "glass"]);
+    assert_eq!(names, ["matt", "shiny", "lamp", "veil"]);
     assert!(materials.iter().all(|m| m.two_sided));
     assert!(
         matches!(&materials[0].surface, Surface::Lambertian { reflectance } if reflectance.factor == Rgb::new(0.5, 0.25, 0.125))
@@ -83,9 +83,100 @@ fn materials_become_lambertian_phong_and_glass() {
     assert_warns(&reading, &["Kd + Ks", "\"shiny\""]);
     assert_eq!(materials[2].emission, Rgb::new(10.0, 20.0, 30.0));
     assert_eq!(colour(&materials[2].surface).factor, Rgb::BLACK, "a lamp without Kd reflects nothing");
-    assert!(materials[3].transmission.is_some());
+    assert_eq!((&materials[3].transmission, materials[3].opacity), (&None, Opacity::Blend));
+    assert_eq!(colour(&materials[3].surface).alpha, 0.25);
     assert!(matches!(materials[3].surface, Surface::Lambertian { .. }), "illum 1 has no highlight");
-    assert_warns(&reading, &["lets light straight through", "\"glass\""]);
+}
+
+/// Models 6 and 7 refract; 4 and 9 are panes if anything else says so; others are never glass.
+#[test]
+fn illumination_models_of_glass() {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl m\nf 1 2 3\n");
+    let read = |mtl: &str| {
+        let mtl = format!("newmtl m\nKd 0.5 0.5 0.5\n{mtl}");
+        let reading = read_with("a.obj", obj.as_bytes(), &[("a.mtl", mtl.as_bytes())]).unwrap();
+        reading.scene.materials[0].clone()
+    };
+    let body = Some(Volume { attenuation: Rgb::BLACK });
+    for (mtl, expected) in [
+        ("illum 7\nNi 1.4\nTf 0.9 0.8 0.7", Some((1.0, body, 1.4, Rgb::new(0.9, 0.8, 0.7)))),
+        ("illum 6\nNi 1.33", Some((1.0, body, 1.33, Rgb::WHITE))),
+        // Nothing bends, so that nothing is inside.
+        ("illum 7\nNi 1\nd 0.1", Some((0.9, None, 1.0, Rgb::grey(0.5)))),
+        ("illum 7\nNi 77", Some((1.0, body, 1.5, Rgb::WHITE))),
+        ("illum 4\nd 0.25", Some((0.75, None, 1.5, Rgb::grey(0.5)))),
+        ("illum 9\nTr 0.75\nTf 1 1 1", Some((0.75, None, 1.5, Rgb::WHITE))),
+        ("illum 4\nd 1", None),
+        ("illum 9\nTf 0 0 0", None),
+        ("illum 2\nTf 1 1 1\nNi 1.5", None),
+        ("illum 5\nd 1", None),
+        ("Ni 1.5", None),
+    ] {
+        let material = read(mtl);
+        let found = material.transmission.as_ref().map(|t| {
+            let Surface::MetallicRoughness { base_color, ior, .. } = &material.surface else { panic!("{mtl}") };
+            (t.factor, t.volume, *ior, base_color.factor)
+        });
+        assert_eq!(found, expected, "{mtl}");
+        assert_eq!(material.opacity, Opacity::Opaque, "{mtl}");
+    }
+    // Roughness of the lobe of exponent 30 is (2/32)^¼.
+    for (exponent, roughness) in [("30", 0.5), ("250", 0.0), ("0", 0.0)] {
+        let Surface::MetallicRoughness { roughness: found, .. } = read(&format!("illum 7\nNs {exponent}")).surface
+        else {
+            panic!()
+        };
+        assert_eq!(found, roughness);
+    }
+}
+
+#[test]
+fn masks_and_bumps() {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}vt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+    let (red, mask, wide) = (png(&[[100, 0, 0], [100, 0, 0]]), png(&[[0; 3], [255; 3]]), png(&[[255; 3]; 3]));
+    let read = |mtl: &str| {
+        let mtl = format!("newmtl m\n{mtl}\n");
+        let files: [(&str, &[u8]); 4] =
+            [("a.mtl", mtl.as_bytes()), ("red.png", &red), ("mask.png", &mask), ("wide.png", &wide)];
+        read_with("a.obj", obj.as_bytes(), &files).unwrap()
+    };
+    let texels = |mtl: &str| {
+        let reading = read(mtl);
+        let material = &reading.scene.materials[0];
+        assert_eq!(material.opacity, Opacity::Mask { cutoff: 0.5 }, "{}", warnings(&reading));
+        reading.scene.images[colour(&material.surface).texture.as_ref().unwrap().image].rgba.clone()
+    };
+    // By brightness, as no texel of the mask says anything by its alpha; over the colours, or over white.
+    assert_eq!(texels("map_Kd red.png\nmap_d mask.png"), [100, 0, 0, 0, 100, 0, 0, 255]);
+    assert_eq!(texels("Kd 0.5 0.5 0.5\nmap_d mask.png"), [255, 255, 255, 0, 255, 255, 255, 255]);
+    for other in ["wide.png", "-s 2 2 2 mask.png"] {
+        let reading = read(&format!("map_Kd red.png\nmap_d {other}"));
+        assert_warns(&reading, &["\"m\"", "map_d is ignored"]);
+        assert_eq!(reading.scene.materials[0].opacity, Opacity::Opaque);
+    }
+    // A mask that cannot be had leaves what d says.
+    let reading = read("d 0.5\nmap_d gone.png");
+    assert_eq!(reading.scene.materials[0].opacity, Opacity::Blend);
+
+    let reading = read("norm -bm 0.5 red.png\nmap_Bump -bm 2 mask.png");
+    let normal_map = reading.scene.materials[0].normal_map.as_ref().unwrap();
+    assert_eq!((normal_map.scale, &normal_map.texture), (0.5, &TextureRef::of(0)));
+    assert_warns(&reading, &["bump maps are ignored", "\"m\""]);
+    assert_eq!(reading.scene.images.len(), 1);
+}
+
+/// OBJ counts v from below: at the lower left corner (our v is 1) the look-up is at `o` from the left and from below.
+#[test]
+fn maps_are_moved_and_scaled() {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}vt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+    let mtl = b"newmtl m\nmap_Kd -s 2 3 1 -o 0.25 0.5 a.png\n";
+    let picture = png(&[[1, 2, 3]]);
+    let files: [(&str, &[u8]); 2] = [("a.mtl", mtl), ("a.png", &picture)];
+    let reading = read_with("a.obj", obj.as_bytes(), &files).unwrap();
+    assert!(!warnings(&reading).contains("a.mtl"), "{}", warnings(&reading));
+    let transform = colour(&reading.scene.materials[0].surface).texture.as_ref().unwrap().transform;
+    assert_eq!(transform.apply([0.0, 1.0]), [0.25, 0.5]);
+    assert_eq!(transform.apply([1.0, 0.0]), [2.25, 0.5 - 3.0]);
 }
 
 #[test]
@@ -108,7 +199,7 @@ fn ambient_light_counts_only_where_nothing_else_emits() {
 fn textures_are_read_with_their_options() {
     let obj = format!("mtllib a.mtl\n{TRIANGLE}vt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
     let mtl =
-        b"newmtl m\nmap_Kd -clamp on -bm 0.5 -s 1 1 1 tex\\my wood.png\nmap_d tex\\my wood.png\nmap_Ke glow.png\n";
+        b"newmtl m\nmap_Kd -clamp on -bm 0.5 -t 1 1 1 tex\\my wood.png\nmap_d tex\\my wood.png\nmap_Ke glow.png\n";
     let (wood, glow) = (png(&[[100, 0, 0]]), png(&[[255, 255, 255]]));
     let files: [(&str, &[u8]); 3] = [("a.mtl", mtl), ("tex/my wood.png", &wood), ("glow.png", &glow)];
     let reading = read_with("a.obj", obj.as_bytes(), &files).unwrap();
@@ -119,7 +210,7 @@ fn textures_are_read_with_their_options() {
     assert_eq!(texel.texture.as_ref().unwrap().wrap, [twinray_scene::Wrap::Clamp; 2]);
     assert_eq!((material.emission, material.emission_texture.is_some()), (Rgb::WHITE, true));
     assert_eq!(material.opacity, Opacity::Mask { cutoff: 0.5 });
-    assert_warns(&reading, &["a.mtl: line 2", "-s"]);
+    assert_warns(&reading, &["a.mtl: line 2", "-t"]);
 }
 
 #[test]

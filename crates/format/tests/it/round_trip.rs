@@ -227,6 +227,16 @@ fn obj_keeps_triangles_and_matt_materials() {
         assert!(a.two_sided);
     }
     assert_eq!(reading.scene.images[0].rgba, scene.images[0].rgba);
+    // Glass keeps whether it is a body and how much passes, though not what it absorbs.
+    for (i, factor, is_body) in [(2, 0.75, false), (3, 1.0, true)] {
+        let read = &reading.scene.materials[i];
+        let transmission = read.transmission.as_ref().unwrap();
+        assert_eq!((transmission.factor, transmission.volume.is_some()), (factor, is_body));
+        let scale = |m: &Material| m.normal_map.as_ref().map(|n| n.scale);
+        assert_eq!(scale(read), scale(&scene.materials[i]));
+    }
+    let placed = &reading.scene.materials[2].normal_map.as_ref().unwrap().texture.transform;
+    assert_eq!((placed.offset, placed.scale), ([0.25, -3.0], [2.0, -0.125]), "all but the turn");
     let Surface::Phong { specular, exponent, .. } = &reading.scene.materials[4].surface else { panic!() };
     assert_eq!((*specular, *exponent), (Rgb::grey(0.3), 30.0));
     assert_eq!(reading.scene.meshes[0].texcoords, scene.meshes[0].texcoords);
