@@ -34,6 +34,8 @@ const SAME_PLANE: f64 = 0.2;
 #[derive(Clone, Copy, Debug, Default)]
 struct Work {
     sight: Sight,
+    /// The camera sees nothing there; exposure must not take that for darkness.
+    is_outside: bool,
     gathered: Option<Gathered>,
     direct: Rgb,
     indirect: Rgb,
@@ -74,8 +76,11 @@ impl Tile<'_> {
             let mut numbers = PixelSample::new(self.seed, pixel.number, before[n] + k);
             let shadows = shadows(pixel);
             // Where the camera sees nothing, as beyond a fisheye's circle, the pixel stays black.
-            let Some((origin, direction)) = ray(pixel, &mut numbers) else { continue };
             let work = &mut work[n];
+            let Some((origin, direction)) = ray(pixel, &mut numbers) else {
+                work.is_outside = true;
+                continue;
+            };
             work.sight = estimator.look(origin, direction, &mut numbers);
             let Some(point) = &work.sight.point else { continue };
             let (light, lamp) = estimator.lit(point, shadows, &mut numbers);
@@ -191,6 +196,9 @@ fn reflected(point: &Point, direction: DVec3) -> Rgb {
 /// Adds a pixel's sample to its sums.
 fn add(work: &Work, seen: &mut Seen) {
     seen.rays += 1;
+    if work.is_outside {
+        return;
+    }
     seen.empty += u32::from(work.sight.empty);
     let lights = work.sight.lights;
     let radiance = lights + work.direct + work.indirect;

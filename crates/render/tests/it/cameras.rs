@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use twinray_render::reference::{self, PathPictureOptions};
-use twinray_render::{Crop, Image, Picture, PictureOptions, render};
+use twinray_render::{Crop, Gather, GatherOptions, Image, Picture, PictureOptions, render};
 use twinray_scene::{Camera, Lens, PatchScene, Projection, Scene, builtin};
 use twinray_solve::{Observer, Params, Solution, Solver};
 
@@ -106,11 +106,42 @@ fn a_lens_blurs_as_its_aperture_and_focus_say() {
         let traced = spread(&reference::picture(&scene, &camera, &options).0.image);
         let options = PictureOptions { width: PIXELS, height: PIXELS, samples: 64, ..PictureOptions::default() };
         let seen = spread(&solve_and_look(&scene, &camera, &options).image);
-        println!("aperture {radius}, focus {focus}: traced {traced:.5}, seen {seen:.5}, expected {expected:.5}");
+        let gathered = spread(&gather(&scene, &camera, PIXELS, 64.0).image);
+        println!(
+            "aperture {radius}, focus {focus}: traced {traced:.5}, seen {seen:.5}, gathered {gathered:.5}, expected {expected:.5}"
+        );
+        assert!((gathered / expected - 1.0).abs() < 0.036, "{gathered} against {expected}");
         assert!((traced / expected - 1.0).abs() < 0.036, "{traced} against {expected}");
         // Its points are evenly spread: better than independent ones.
         assert!((seen / expected - 1.0).abs() < 0.01, "{seen} against {expected}");
     }
+}
+
+/// A square picture by final gather.
+fn gather(scene: &PatchScene, camera: &Camera, side: u32, samples: f64) -> Picture {
+    let solution = solved(scene, camera, 100_000);
+    let mut gather =
+        Gather::new(scene, &solution, camera, &GatherOptions { width: side, height: side, ..GatherOptions::default() });
+    gather.advance_to(samples);
+    gather.picture()
+}
+
+/// The film beside the circle is black, and exposure does not take it for a dark surface: the two methods, which take
+/// tiles for their logarithms, see the same mean of them but for noise.
+#[test]
+fn black_film_does_not_change_the_exposure() {
+    let authored = builtin::cornell(true);
+    let scene = cut(&authored, 2000);
+    let camera = Camera { projection: Projection::Fisheye { angle: 2.5 }, ..authored.cameras[0].clone() };
+    let gathered = gather(&scene, &camera, 32, 32.0);
+    let options = PathPictureOptions { width: 32, height: 32, ..PathPictureOptions::default() };
+    let traced = reference::picture(&scene, &camera, &options).0;
+    let [a, b] = [&gathered, &traced].map(|p| p.log2_luminance.unwrap());
+    println!("log2 luminance: gathered {a:.3}, traced {b:.3}");
+    // A third of the tiles lie on the edge of the circle: half black, they would lower the mean by a third of a stop. The
+    // noise of a tile is some percent, and so is what patches know.
+    assert!((a - b).abs() < 0.1, "{a} and {b}");
+    assert!(gathered.image.pixel(0, 0).is_black() && gathered.empty == 0.0);
 }
 
 /// In a furnace all directions are equal, and a fisheye sees a disc of them.
