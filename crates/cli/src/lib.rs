@@ -20,6 +20,7 @@ fn plain(text: &str) -> String {
 
 mod args;
 mod commands;
+mod denoise;
 mod display;
 mod estimate;
 mod failure;

@@ -11,6 +11,7 @@ use super::path::MOST_LAYER_SAMPLES;
 use super::render::{Light, default_output, encode, light};
 use crate::args::RenderArgs;
 use crate::commands::{self, solving};
+use crate::denoise::Denoiser;
 use crate::display::{self, AovArg, Film};
 use crate::failure::Ending;
 use crate::input::Loaded;
@@ -42,6 +43,7 @@ pub(super) fn run(
     loaded: &Loaded,
     camera: &Camera,
     film: Film,
+    denoiser: Option<Denoiser>,
     output: Output,
     loading: f64,
 ) -> anyhow::Result<Ending> {
@@ -101,13 +103,16 @@ pub(super) fn run(
     let start = Instant::now();
     let mut picture = gather.picture();
     let layers = layers(args, loaded, camera, &film, &gather);
+    let samples = (gather.samples().ceil() as u32).min(MOST_LAYER_SAMPLES);
+    display::denoise(denoiser.as_ref(), &mut picture, loaded, camera, &film, samples)?;
     let factor = args.display.exposure.factor(&picture);
     let how = format!(
-        "{} rays, {:.1} camera rays per pixel, seed {}, preset {:?}",
+        "{} rays, {:.1} camera rays per pixel, seed {}, preset {:?}{}",
         solution.rays(),
         gather.samples(),
         settings.seed,
-        settings.preset
+        settings.preset,
+        if denoiser.is_some() { ", denoised" } else { "" }
     );
     output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();

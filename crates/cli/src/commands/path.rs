@@ -9,6 +9,7 @@ use twinray::scene::Camera;
 
 use super::render::{default_output, encode};
 use crate::args::{Preset, RenderArgs};
+use crate::denoise::Denoiser;
 use crate::display::{self, AovArg, Film};
 use crate::failure::Ending;
 use crate::input::Loaded;
@@ -46,6 +47,7 @@ pub(super) fn run(
     loaded: &Loaded,
     camera: &Camera,
     film: Film,
+    denoiser: Option<Denoiser>,
     output: Output,
     loading: f64,
 ) -> anyhow::Result<Ending> {
@@ -77,12 +79,15 @@ pub(super) fn run(
 
     let start = Instant::now();
     let mut picture = tracer.picture();
-    let mut layers = display::layers(args, loaded, camera, &film, tracer.samples().min(MOST_LAYER_SAMPLES));
+    let samples = tracer.samples().min(MOST_LAYER_SAMPLES);
+    let mut layers = display::layers(args, loaded, camera, &film, samples);
     if args.display.wants(AovArg::Error) {
         layers.error = Some(tracer.variance().iter().map(|v| v.sqrt()).collect());
     }
+    display::denoise(denoiser.as_ref(), &mut picture, loaded, camera, &film, samples)?;
     let factor = args.display.exposure.factor(&picture);
-    let how = format!("{} paths per pixel, seed {seed}", tracer.samples());
+    let denoised = if denoiser.is_some() { ", denoised" } else { "" };
+    let how = format!("{} paths per pixel, seed {seed}{denoised}", tracer.samples());
     output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 

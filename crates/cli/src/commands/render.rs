@@ -37,6 +37,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
         MethodArg::Gather => gather::check(args)?,
         MethodArg::Patches => {}
     }
+    let denoiser = display::denoiser(args)?;
     commands::set_threads(args.load.threads);
     interrupt::install();
     let start = Instant::now();
@@ -53,8 +54,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let loading = start.elapsed().as_secs_f64();
 
     match method {
-        MethodArg::Path => return path::run(args, &loaded, camera, film, output, loading),
-        MethodArg::Gather => return gather::run(args, &loaded, camera, film, output, loading),
+        MethodArg::Path => return path::run(args, &loaded, camera, film, denoiser, output, loading),
+        MethodArg::Gather => return gather::run(args, &loaded, camera, film, denoiser, output, loading),
         MethodArg::Patches => {}
     }
     let goal = solving::goal(&args.solve, loaded.patches.len(), None);
@@ -77,8 +78,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     }
     let mut picture = render::render(&loaded.patches, &solution, camera, &options);
     let layers = display::layers(args, &loaded, camera, &film, samples);
+    display::denoise(denoiser.as_ref(), &mut picture, &loaded, camera, &film, samples)?;
     let factor = args.display.exposure.factor(&picture);
-    let how = format!("{} rays, seed {}, preset {:?}", solution.rays(), settings.seed, settings.preset);
+    let mut how = format!("{} rays, seed {}, preset {:?}", solution.rays(), settings.seed, settings.preset);
+    how += if denoiser.is_some() { ", denoised" } else { "" };
     output.write(&encode(args, &loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
@@ -169,7 +172,8 @@ fn work(args: &RenderArgs) -> Work {
         false if is_gathered => solving::work_for_gather(&args.solve),
         false => solving::work(&args.solve, None),
     };
-    let (size, has_layers) = (args.display.expected_size(args.size), !args.display.aov.is_empty());
+    let has_layers = args.display.denoise || !args.display.aov.is_empty();
+    let size = args.display.expected_size(args.size);
     Work { picture: Some(PictureWork { size, samples, is_traced, is_gathered, has_layers }), ..solve }
 }
 

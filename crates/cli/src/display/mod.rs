@@ -6,11 +6,12 @@ mod parse;
 
 use anyhow::{anyhow, bail};
 use clap::ValueEnum;
-use twinray::render::{AovOptions, Aovs, Crop, Exposure, ToneCurve, WhiteBalance, aovs};
+use twinray::render::{AovOptions, Aovs, Crop, Exposure, Picture, ToneCurve, WhiteBalance, aovs};
 use twinray::scene::{Camera, Lens, Projection};
 
 use crate::args::{MethodArg, RenderArgs};
 use crate::commands::render::default_size;
+use crate::denoise::Denoiser;
 use crate::input::Loaded;
 use parse::{crop, dof, exposure, fisheye, white_balance};
 
@@ -44,6 +45,10 @@ pub struct DisplayArgs {
     /// Layers of an .exr beside the picture, such as albedo,normal
     #[arg(long, value_enum, value_name = "LAYERS", value_delimiter = ',')]
     pub aov: Vec<AovArg>,
+    /// Remove noise with Open Image Denoise (https://www.openimagedenoise.org), which takes it for noise whatever it is;
+    /// needs a twinray built with `--features oidn`, and the library
+    #[arg(long)]
+    pub denoise: bool,
 }
 
 /// An aperture and what it is focussed on.
@@ -235,6 +240,28 @@ pub fn film(args: &RenderArgs, camera: &Camera) -> anyhow::Result<Film> {
         );
     }
     Ok(Film { width, height, crop })
+}
+
+/// What removes noise, if that is wanted; it is looked for before anything is paid for.
+pub fn denoiser(args: &RenderArgs) -> anyhow::Result<Option<Denoiser>> {
+    args.display.denoise.then(Denoiser::open).transpose()
+}
+
+/// Removes noise, if that is wanted.
+///
+/// # Errors
+/// What the library says.
+pub fn denoise(
+    denoiser: Option<&Denoiser>,
+    picture: &mut Picture,
+    loaded: &Loaded,
+    camera: &Camera,
+    film: &Film,
+    samples: u32,
+) -> anyhow::Result<()> {
+    let Some(denoiser) = denoiser else { return Ok(()) };
+    let Film { width, height, crop } = *film;
+    denoiser.denoise(picture, &aovs(&loaded.patches, camera, &AovOptions { width, height, crop, samples }))
 }
 
 /// The layers that are wanted and that the scene alone decides.

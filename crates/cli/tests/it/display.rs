@@ -199,3 +199,26 @@ fn layers_are_written_on_demand() {
         assert!(words.iter().all(|word| run.stderr.contains(word)), "{}", run.stderr);
     }
 }
+
+/// Without the library, or without the feature that looks for it, one is told where to get it; with both, noise goes away.
+#[test]
+fn denoising_says_what_it_needs() {
+    let place = Place::new();
+    let noisy = ["render", "cornell", "--method", "path", "--samples", "4", "--size", "64x48"];
+    let run = place.run(&[&noisy[..], &["--denoise", "-o", "denoised.exr"]].concat());
+    if cfg!(feature = "oidn") && run.code == Some(0) {
+        place.done(&[&noisy[..], &["-o", "noisy.exr"]].concat());
+        place.done(&[&noisy[..4], &["--samples", "400", "--size", "64x48", "-o", "long.exr"]].concat());
+        let far = |name: &str| place.done(&["compare", name, "long.exr", "--json"]).json()["relmse"].as_f64().unwrap();
+        let (before, after) = (far("noisy.exr"), far("denoised.exr"));
+        println!("relMSE {before:.4} with noise, {after:.4} without");
+        assert!(after < 0.4 * before, "{after} and {before}");
+    } else {
+        println!("skipped: Open Image Denoise is not there to be tried");
+        assert_eq!(run.code, Some(2));
+        assert!(run.stderr.contains("https://www.openimagedenoise.org"), "{}", run.stderr);
+        let next = if cfg!(feature = "oidn") { "LD_LIBRARY_PATH" } else { "--features oidn" };
+        assert!(run.stderr.contains(next), "{}", run.stderr);
+        assert!(place.files().is_empty(), "it is refused before anything is written");
+    }
+}
