@@ -11,7 +11,7 @@ fn solved(place: &Place, args: &[&str], goal: &str) -> (f64, u64) {
 #[test]
 fn rays_are_shot_until_the_error_is_reached() {
     let place = Place::new();
-    let render = ["render", "cornell", "--patches", "2000", "--size", "64x48"];
+    let render = ["render", "cornell", "--method", "patches", "--patches", "2000", "--size", "64x48"];
     for (preset, coarse, fine) in [("default", "8%", "4%"), ("paper", "10%", "5%")] {
         let args = [&render[..], &["--preset", preset]].concat();
         let (error, few) = solved(&place, &args, coarse);
