@@ -5,15 +5,18 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use twinray_scene::{Camera, PatchScene, Rgb, Side};
+use twinray_scene::sample::Stream;
+use twinray_scene::{Camera, PatchScene, Rgb};
 
 use crate::film::{Crop, Film};
-use crate::picture::first_side;
+use crate::picture::{MOST_PASSED, first_side};
+use crate::vertex::{Look, Step, Vertex};
 
 /// Arbitrary output variables, each `[height, width]` if it is there, first row on top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Aovs {
-    /// Albedo towards the camera of what is seen, linear Rec. 709; black where nothing is.
+    /// Albedo towards the camera of what is seen, times what mirrors and glass before it leave, linear Rec. 709; black
+    /// where nothing is seen.
     pub albedo: Option<Vec<[f32; 3]>>,
     /// Shading normal in world space, on the side that is seen; shorter than 1 where a pixel sees several, 0 where nothing.
     pub normal: Option<Vec<[f32; 3]>>,
@@ -49,7 +52,10 @@ pub struct AovOptions {
     pub samples: u32,
 }
 
-/// Albedo, normal, depth and patch of what each pixel sees: means over its samples, depths over those that see anything.
+/// Purpose of the random numbers by which rays go through glass or are reflected.
+const SPECULAR: u64 = 0xA0_5EE7;
+
+/// Albedo, normal, depth and patch of what each pixel sees, in mirrors and through glass too: means over its samples, depths over those that see anything.
 ///
 /// # Panics
 /// If the crop is not within the film.
@@ -61,8 +67,10 @@ pub fn aovs(scene: &PatchScene, camera: &Camera, options: &AovOptions) -> Aovs {
             let at = film.place(index);
             let mut sum = Seen::default();
             for k in 0..options.samples {
+                let mut random = Stream::new(0, SPECULAR, film.number(at) << 32 | u64::from(k));
+                let mut numbers = || random.uniform();
                 let ray = film.sample(camera, at, k);
-                let seen = ray.and_then(|(origin, direction)| seen(scene, camera, origin, direction));
+                let seen = ray.and_then(|(origin, direction)| seen(scene, camera, origin, direction, &mut numbers));
                 sum.add(seen.as_ref(), k == 0);
             }
             sum
@@ -105,18 +113,40 @@ impl Seen {
     }
 }
 
-/// What a ray of the world meets first.
-fn seen(scene: &PatchScene, camera: &Camera, origin: DVec3, direction: DVec3) -> Option<Seen> {
-    let (hit, patch) = first_side(scene, origin - scene.centre(), direction)?;
-    let surface = scene.surface_at(&hit, 0.0);
-    let cosine = scene.normal(patch).dot(-direction).max(0.0);
-    // Mirrors and glass have what they are seen to reflect and let through, as denoisers expect.
-    let passed = surface.scatter.specular.map_or(Rgb::BLACK, |s| s.passed(cosine, hit.side == Side::Back));
-    Some(Seen {
-        albedo: surface.scatter.brdf.albedo(cosine) + passed,
-        normal: surface.normal,
-        depth: camera.depth(scene.point_of(hit.triangle, hit.u, hit.v) + scene.centre()),
-        hits: 1,
-        patch: Some(patch.0),
-    })
+/// What a ray of the world sees: the first point that scatters, in mirrors and through glass too.
+fn seen(
+    scene: &PatchScene,
+    camera: &Camera,
+    origin: DVec3,
+    direction: DVec3,
+    numbers: &mut impl FnMut() -> f64,
+) -> Option<Seen> {
+    let (mut hit, mut patch) = first_side(scene, origin - scene.centre(), direction)?;
+    let (mut wo, mut throughput) = (-direction, Rgb::WHITE);
+    let mut length = (scene.point_of(hit.triangle, hit.u, hit.v) + scene.centre() - origin).length();
+    for _ in 0..MOST_PASSED {
+        let vertex = Vertex::new(scene, &hit, patch, wo, Look::Display);
+        match vertex.step(wo, numbers(), || [numbers(), numbers()]) {
+            Step::End => return None,
+            Step::Scatter(factor) => {
+                let albedo = vertex.scatter.brdf.albedo(vertex.geometric.dot(wo).max(0.0));
+                return Some(Seen {
+                    albedo: throughput * albedo * factor,
+                    normal: vertex.normal,
+                    // Mirrors are unfolded: what they show lies behind them.
+                    depth: camera.depth(origin + direction * length),
+                    hits: 1,
+                    patch: Some(patch.0),
+                });
+            }
+            Step::On(way) => {
+                throughput = throughput * way.factor;
+                hit = vertex.next(scene, way.beyond, way.direction)?;
+                patch = scene.patch_of(&hit)?;
+                length += hit.t;
+                wo = -way.direction;
+            }
+        }
+    }
+    None
 }

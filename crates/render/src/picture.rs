@@ -75,7 +75,7 @@ const FIREFLY: f64 = 6.0;
 /// Candidates for the lamp that a camera ray sees in a lobe, where no observer summed lamps up.
 const LAMPS: u32 = 16;
 /// Mirrors and sheets of glass that a camera ray passes at most.
-const MOST_PASSED: u32 = 32;
+pub(crate) const MOST_PASSED: u32 = 32;
 /// One-sided backs that a camera ray passes at most.
 const MOST_BACKS: u32 = 16;
 

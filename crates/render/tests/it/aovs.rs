@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use twinray_render::{AovOptions, Aovs, Crop, aovs};
-use twinray_scene::{Camera, PatchId, Projection, Surface, Texel, builtin};
+use twinray_scene::{Camera, PatchId, Projection, Rgb, Surface, Texel, builtin};
 
 use crate::reference::cut;
 
@@ -12,7 +12,7 @@ fn a_plate_is_what_it_is() {
     let mut authored = builtin::plates(1.0);
     authored.instances.truncate(1);
     authored.materials.iter_mut().for_each(|m| {
-        m.surface = Surface::Lambertian { reflectance: Texel::constant(twinray_scene::Rgb::new(0.25, 0.5, 0.75)) };
+        m.surface = Surface::Lambertian { reflectance: Texel::constant(Rgb::new(0.25, 0.5, 0.75)) };
     });
     let scene = cut(&authored, 8);
     let normal = scene.normal(PatchId(0));
@@ -53,5 +53,39 @@ fn a_plate_is_what_it_is() {
     for (i, index) in part.patch.unwrap().iter().enumerate() {
         let at = (7 + i / 9) * 40 + 12 + i % 9;
         assert_eq!((*index, part.albedo.as_ref().unwrap()[i]), (patch[at], albedo[at]));
+    }
+}
+
+/// A mirror shows what faces it: as far behind itself as that is before it, and in its own colour.
+#[test]
+fn mirrors_show_what_faces_them() {
+    let mut authored = builtin::plates(1.0);
+    let gold = Rgb::new(0.9, 0.6, 0.3);
+    let faces_up = |m: usize| authored.meshes.iter().any(|mesh| mesh.material == m && mesh.positions[0][1] < 0.5);
+    let [mirror, other]: [usize; 2] = if faces_up(0) { [0, 1] } else { [1, 0] };
+    authored.materials[mirror].surface = Surface::MetallicRoughness {
+        base_color: Texel::constant(gold),
+        metallic: 1.0,
+        roughness: 0.0,
+        metallic_roughness_texture: None,
+        specular: 1.0,
+        specular_texture: None,
+        specular_color: Rgb::WHITE,
+        specular_color_texture: None,
+        ior: 1.5,
+    };
+    authored.materials[other].surface = Surface::Lambertian { reflectance: Texel::constant(Rgb::grey(0.5)) };
+    let scene = cut(&authored, 8);
+    let camera = Camera::look_at("c", DVec3::new(0.5, 0.4, 0.5), DVec3::new(0.5, 0.0, 0.5), DVec3::X, 10.0);
+    let all = aovs(&scene, &camera, &AovOptions { width: 8, height: 8, crop: None, samples: 4 });
+    for i in 0..64 {
+        let normal = DVec3::from_array(all.normal.as_ref().unwrap()[i].map(f64::from));
+        assert!((normal + DVec3::Y).length() < 1e-6, "{normal}");
+        assert!((all.depth.as_ref().unwrap()[i] - 1.4).abs() < 1e-6);
+        let patch = PatchId(all.patch.as_ref().unwrap()[i]);
+        assert!(scene.normal(patch).y < 0.0);
+        // Gold turns paler towards grazing incidence; this is within 8° of the normal.
+        let albedo = Rgb::from_f32(all.albedo.as_ref().unwrap()[i]);
+        assert!((albedo - gold * 0.5).map(f64::abs).max_channel() < 1e-3, "{albedo:?}");
     }
 }
