@@ -7,9 +7,12 @@
 use std::io;
 
 use twinray_format::{
-    FormatError, Limits, Reading, read_picture, read_scene, read_solution, write_glb, write_obj, write_solution,
+    FormatError, Limits, Reading, read_ies, read_picture, read_radiance_map, read_scene, read_solution, write_glb,
+    write_obj, write_solution,
 };
-use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Rgb, Surface, Texel, builtin};
+use twinray_scene::{
+    LightKind, PatchBudget, PatchOptions, PatchScene, PunctualLight, Rgb, Scene, Surface, Texel, builtin,
+};
 use twinray_solve::{Params, Record, Solver};
 
 /// Small enough that no input takes long; what is over them is refused as with the usual ones.
@@ -65,6 +68,29 @@ pub fn picture(bytes: &[u8]) {
         assert!(picture.image.pixels.iter().flatten().all(|c| c.is_finite()), "a pixel is not finite");
         assert!(picture.display.is_none_or(|d| d.len() == picture.image.pixels.len()));
     }
+}
+
+/// A map of all directions: Radiance or EXR.
+pub fn map(bytes: &[u8]) {
+    if let Ok((map, _)) = read_radiance_map("a.hdr", bytes, &limits()) {
+        assert_eq!(map.pixels.len(), map.width as usize * map.height as usize);
+        assert!(map.pixels.iter().flatten().all(|c| *c >= 0.0 && c.is_finite()), "a pixel is no radiance");
+    }
+}
+
+/// A luminaire. What can be read is a light without faults.
+pub fn ies(bytes: &[u8]) {
+    let Ok(profile) = read_ies("a.ies", bytes, &limits()) else { return };
+    assert!(profile.flux() >= 0.0 && profile.flux().is_finite());
+    let light = PunctualLight {
+        name: String::new(),
+        kind: LightKind::Point,
+        intensity: Rgb::WHITE,
+        transform: glam::DAffine3::IDENTITY,
+        profile: Some(profile.into()),
+    };
+    let faults = Scene { lights: vec![light], ..Scene::default() }.validate();
+    assert!(faults.is_empty(), "what was read has faults: {faults:?}");
 }
 
 /// A stored solution, as it is and with its checksums put right, without which no change would get any further. What can

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use crate::display::DisplayArgs;
+use crate::light_args::LightArgs;
 
 /// The light of a whole scene, by bi-directional rays.
 #[derive(Debug, Parser)]
@@ -74,6 +75,9 @@ pub struct LoadArgs {
     /// Unit of the file's lengths [default: m]
     #[arg(long, value_enum)]
     pub unit: Option<Unit>,
+    /// Light beside its own.
+    #[command(flatten)]
+    pub light: LightArgs,
     /// What it may ask for.
     #[command(flatten)]
     pub read: ReadArgs,

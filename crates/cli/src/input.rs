@@ -10,6 +10,7 @@ use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, 
 use crate::args::{LoadArgs, ReadArgs, ViewArgs};
 use crate::estimate::{self, Expected, Work};
 use crate::files::{self, Folder};
+use crate::lights::LightSettings;
 use crate::stored::{self, Stored};
 
 /// Patches where neither the user nor the scene says how many.
@@ -32,6 +33,8 @@ pub struct Loaded {
     pub stored: Option<Stored>,
     /// Where the scene is, as seen from the working folder, and how it was cut.
     source: SceneSource,
+    /// How it was lit beside what its file says.
+    light: LightSettings,
 }
 
 impl Loaded {
@@ -42,7 +45,8 @@ impl Loaded {
 
     /// Where the scene is, as seen from a folder, and how it was cut.
     pub fn source_seen_from(&self, folder: &Path) -> SceneSource {
-        SceneSource { file: stored::seen_from(&self.source.file, folder), ..self.source.clone() }
+        let place = |file: &str| stored::seen_from(file, folder);
+        SceneSource { file: place(&self.source.file), light: self.light.words(place), ..self.source.clone() }
     }
 }
 
@@ -56,8 +60,7 @@ pub fn read(name: &str, args: &ReadArgs) -> anyhow::Result<(Scene, Vec<String>)>
         let names: Vec<_> = builtin::NAMES.iter().map(|(n, _)| *n).collect();
         bail!("{name}: no such file, and no built-in scene of that name; built-in are {}", names.join(", "));
     }
-    let limits = Limits { allow_outside: args.allow_outside, ..Limits::default() };
-    let limits = args.max_memory.map_or(limits.clone(), |bytes| limits.within(bytes));
+    let limits = limits(args);
     let bytes = files::read(path, limits.max_file_bytes).with_context(|| format!("{name}: cannot be read"))?;
     let folder = Folder::of(path, args.allow_outside, limits.max_file_bytes);
     let mut resolver = |reference: &str| folder.read(reference);
@@ -68,6 +71,12 @@ pub fn read(name: &str, args: &ReadArgs) -> anyhow::Result<(Scene, Vec<String>)>
         bail!("{name}: {fault} ({} faults in all)", faults.len());
     }
     Ok((reading.scene, reading.warnings.iter().map(ToString::to_string).collect()))
+}
+
+/// What files may ask for.
+fn limits(args: &ReadArgs) -> Limits {
+    let limits = Limits { allow_outside: args.allow_outside, ..Limits::default() };
+    args.max_memory.map_or(limits.clone(), |bytes| limits.within(bytes))
 }
 
 /// Reads a scene, or that of a solution file.
@@ -100,8 +109,9 @@ pub fn load(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow::Re
         patches: args.patches,
         patch_size: args.patch_size,
         two_sided: args.two_sided,
+        light: Vec::new(),
     };
-    cut(args, source, view, None, work)
+    cut(args, source, LightSettings::new(&args.light)?, view, None, work)
 }
 
 /// The scene of a solution file, cut as it was for it.
@@ -122,13 +132,18 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow:
     if let Some((option, _)) = differs.iter().find(|(_, differs)| *differs) {
         bail!("{name}: was solved with another {option}: leave it out, or solve the scene anew");
     }
+    let stored_light = LightSettings::from_words(name, &source.light, |file| stored::beside(name, file))?;
+    let light = stored_light.repeated(&LightSettings::new(&args.light)?).map_err(|option| {
+        anyhow!("{name}: was solved with another {option}: leave it out, or solve the scene anew")
+    })?;
     source.file = stored::scene_of(name, &source, args.scene_file.as_deref())?;
     let file = source.file.clone();
-    let loaded = cut(args, source, view, Some(patches), work)?;
+    let lit = if source.light.is_empty() { "" } else { ", the files that lit it among it" };
+    let loaded = cut(args, source, light, view, Some(patches), work)?;
     let found = loaded.patches.fingerprint();
     if found != fingerprint {
         bail!(
-            "{name}: is the light of another scene: of \"{scene}\" with the fingerprint {fingerprint:016x}, and {file} has {found:016x}. It may have changed since; --scene-file FILE says where the right one is"
+            "{name}: is the light of another scene: of \"{scene}\" with the fingerprint {fingerprint:016x}, and {file} has {found:016x}. It may have changed since{lit}; --scene-file FILE says where the right one is"
         );
     }
     Ok(Loaded { stored: Some(stored), ..loaded })
@@ -139,12 +154,15 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow:
 fn cut(
     args: &LoadArgs,
     source: SceneSource,
+    light: LightSettings,
     view: Option<&ViewArgs>,
     known: Option<usize>,
     work: &Work,
 ) -> anyhow::Result<Loaded> {
     let (mut scene, mut warnings) = read(&source.file, &args.read)?;
     scale(&mut scene, source.metres_per_unit);
+    let lit = light.apply(&mut scene, &limits(&args.read))?;
+    warnings.extend(lit.into_iter().map(|w| format!("{}: {w}", source.file)));
     let wanted = view.map(|v| override_camera(&scene, v, source.metres_per_unit)).transpose()?.flatten();
     let name = source.file.as_str();
     let budget = match (source.patches, source.patch_size) {
@@ -177,7 +195,7 @@ fn cut(
     if let Some(camera) = wanted {
         cameras.insert(0, camera);
     }
-    Ok(Loaded { name: scene.name, patches, cameras, warnings, expected, stored: None, source })
+    Ok(Loaded { name: scene.name, patches, cameras, warnings, expected, stored: None, source, light })
 }
 
 /// Lengths of the file to metres.
@@ -192,6 +210,9 @@ fn scale(scene: &mut Scene, metres: f64) {
     // What a coefficient is per metre follows the metre.
     let volumes = scene.materials.iter_mut().filter_map(|m| m.transmission.as_mut()?.volume.as_mut());
     volumes.for_each(|v| v.attenuation = v.attenuation / metres);
+    for light in &mut scene.lights {
+        light.transform.translation *= metres;
+    }
     for camera in &mut scene.cameras {
         camera.eye *= metres;
         if let Projection::Orthographic { half_height } = &mut camera.projection {

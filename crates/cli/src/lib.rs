@@ -27,6 +27,8 @@ mod failure;
 mod files;
 mod input;
 mod interrupt;
+mod light_args;
+mod lights;
 mod memory;
 mod output;
 mod progress;

@@ -85,11 +85,7 @@ pub fn scene_of(name: &str, source: &SceneSource, wish: Option<&str>) -> anyhow:
     if builtin::by_name(&source.file).is_some() {
         return Ok(source.file.clone());
     }
-    // Seen from the folder of the file itself, not of a link to it.
-    let real = std::fs::canonicalize(name).unwrap_or_else(|_| PathBuf::from(name));
-    let link = Path::new(name).parent().unwrap_or(Path::new(""));
-    let folder = if Path::new(name).is_symlink() { real.parent().unwrap_or(link) } else { link };
-    let path = folder.join(&source.file);
+    let path = PathBuf::from(beside(name, &source.file));
     // A pipe would be waited for, a device may have no end: no file may send us there.
     if !path.is_file() {
         bail!(
@@ -98,6 +94,15 @@ pub fn scene_of(name: &str, source: &SceneSource, wish: Option<&str>) -> anyhow:
         );
     }
     Ok(path.to_string_lossy().into_owned())
+}
+
+/// A file that a solution names, as seen from the working folder.
+pub fn beside(name: &str, file: &str) -> String {
+    // Seen from the folder of the file itself, not of a link to it.
+    let real = std::fs::canonicalize(name).unwrap_or_else(|_| PathBuf::from(name));
+    let link = Path::new(name).parent().unwrap_or(Path::new(""));
+    let folder = if Path::new(name).is_symlink() { real.parent().unwrap_or(link) } else { link };
+    folder.join(file).to_string_lossy().into_owned()
 }
 
 /// A scene's name as it is written into a solution in `folder`: built-in scenes as they are, files as seen from there.

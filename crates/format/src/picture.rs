@@ -5,6 +5,7 @@
 
 use std::io::Cursor;
 
+use exr::compression::Compression;
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, Vec2, read};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
@@ -61,13 +62,18 @@ fn read_png(name: &str, bytes: &[u8], limits: &Limits) -> Result<PictureFile, Fo
     Ok(PictureFile { image: Image { width, height, pixels }, display: Some(display) })
 }
 
-fn read_exr(name: &str, bytes: &[u8], limits: &Limits) -> Result<PictureFile, FormatError> {
+pub(crate) fn read_exr(name: &str, bytes: &[u8], limits: &Limits) -> Result<PictureFile, FormatError> {
     let unreadable = |e: exr::error::Error| {
         FormatError::unreadable(name, "an EXR picture with the channels R, G and B", e.to_string())
     };
     // Sizes before anything is allocated for them.
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(unreadable)?;
     for header in &meta.headers {
+        if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+            let hint =
+                "Save it with ZIP or PIZ compression, for example by `oiiotool in.exr --compression zip -o out.exr`";
+            return Err(FormatError::unsupported(name, "compression", "EXR compression DWAA or DWAB", hint));
+        }
         let (width, height) = (header.layer_size.width() as u64, header.layer_size.height() as u64);
         within_texels(name, width, height, limits)?;
         // A block is unpacked with all of its channels, wanted or not.
@@ -95,12 +101,18 @@ fn read_exr(name: &str, bytes: &[u8], limits: &Limits) -> Result<PictureFile, Fo
     Ok(PictureFile { image: Image { width: size.0 as u32, height: size.1 as u32, pixels }, display: None })
 }
 
-fn within_texels(name: &str, width: u64, height: u64, limits: &Limits) -> Result<(), FormatError> {
+pub(crate) fn within_texels(name: &str, width: u64, height: u64, limits: &Limits) -> Result<(), FormatError> {
     let pixels = width.saturating_mul(height);
     within(name, "max_image_texels", pixels, limits.max_image_texels, "pixels")
 }
 
-fn within(name: &str, limit: &'static str, needed: u64, allowed: u64, unit: &str) -> Result<(), FormatError> {
+pub(crate) fn within(
+    name: &str,
+    limit: &'static str,
+    needed: u64,
+    allowed: u64,
+    unit: &str,
+) -> Result<(), FormatError> {
     if needed <= allowed {
         return Ok(());
     }

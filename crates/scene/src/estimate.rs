@@ -6,7 +6,7 @@
 
 use twinray_rays::Bvh;
 
-use crate::authored::{Opacity, Scene, Surface, Texel};
+use crate::authored::{Environment, Opacity, Scene, Surface, Texel};
 use crate::cells::Outline;
 use crate::means::{TriangleMeans, has_specular_textures};
 use crate::patch::{Attributes, PatchError, PatchOptions, Triangle, bounds, cell_area, place, rare_attributes};
@@ -90,13 +90,18 @@ pub fn estimate(scene: &Scene, options: PatchOptions) -> Result<Estimate, PatchE
         + textured_cells * 28
         + if textured_cells > 0 { triangles * ALLOCATION } else { 0 };
     let while_averaged = kernel_input + kernel + means + constants * patches;
+    // The sums by which directions of a map are chosen.
+    let surroundings = match &scene.environment {
+        Some(Environment::Map(map)) => size_of::<f64>() * map.image.pixels.len(),
+        _ => 0,
+    };
     Ok(Estimate {
         triangles,
         patches,
         glossy_patches: glossy,
         reflectance: reflected / total_area,
-        bytes: fixed + kernel + constants * patches,
-        peak_bytes: fixed + while_built.max(while_averaged),
+        bytes: fixed + kernel + constants * patches + surroundings,
+        peak_bytes: fixed + surroundings + while_built.max(while_averaged),
     })
 }
 

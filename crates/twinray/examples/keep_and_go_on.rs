@@ -57,6 +57,7 @@ fn provenance(scene: &PatchScene, solver: &Solver) -> Provenance {
             patches: Some(5_000),
             patch_size: None,
             two_sided: false,
+            light: Vec::new(),
         },
         fingerprint: scene.fingerprint(),
         rays: solver.rays(),

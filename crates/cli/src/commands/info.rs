@@ -48,6 +48,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
             "area": patches.total_area(), "size": size.to_array(),
             "emitted_power_rgb": power.to_array(), "mean_albedo_rgb": albedo.to_array(),
             "environment": patches.environment().is_some(),
+            "lights": patches.lights().len(), "lights_power_rgb": patches.lights_power().to_array(),
             "shared_edges": closedness.shared_edges, "escaping_rays": closedness.escaping_rays,
             "bytes": { "rays": kernel, "patches": constants, "solver": state },
             "power": commands::balance_json(&balance),
@@ -65,6 +66,10 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
     println!("patches    {} ({glossy} glossy, {} emitting)", patches.len(), patches.emitter_count());
     println!("size       {:.4} x {:.4} x {:.4} m, area {:.4} m²", size.x, size.y, size.z, patches.total_area());
     println!("emission   {:.6} {:.6} {:.6} W (R G B), Σ π A L", power.r, power.g, power.b);
+    if !patches.lights().is_empty() {
+        let (count, power) = (patches.lights().len(), patches.lights_power().luminance());
+        println!("lights     {count} without area, {power:.6} lm or W (directional ones: through the scene's sphere)");
+    }
     println!("sky        {}", if patches.environment().is_some() { "yes" } else { "none" });
     println!("albedo     {:.4} {:.4} {:.4} (area-weighted mean)", albedo.r, albedo.g, albedo.b);
     println!(

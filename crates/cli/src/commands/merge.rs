@@ -10,6 +10,7 @@ use twinray::solve::{self, PatchLight, Record};
 
 use crate::args::MergeArgs;
 use crate::failure::Ending;
+use crate::lights::LightSettings;
 use crate::output::{Output, extension};
 use crate::stored::{self, Stored};
 
@@ -135,7 +136,11 @@ fn merge(parts: &[Part], folder: &Path) -> anyhow::Result<SolutionFile<'static>>
         .map(|part| {
             let source = &part.file.provenance.source;
             let scene = stored::scene_of(part.name, source, None).unwrap_or_else(|_| source.file.clone());
-            (stored::seen_from(&scene, folder), source.clone())
+            let place = |file: &str| stored::seen_from(&stored::beside(part.name, file), folder);
+            let light = LightSettings::from_words(part.name, &source.light, place);
+            // What this twinray does not know it hands on as it is.
+            let light = light.map_or_else(|_| source.light.clone(), |light| light.words(str::to_owned));
+            (stored::seen_from(&scene, folder), format::SceneSource { light, ..source.clone() })
         })
         .collect();
     sources.sort_by(|a, b| a.0.cmp(&b.0));

@@ -43,6 +43,7 @@ fn report(name: &str, p: &Provenance, light: &PatchLight, sums: &Sums, can_go_on
         "source": {
             "file": p.source.file, "metres_per_unit": p.source.metres_per_unit, "patches": p.source.patches,
             "patch_size": p.source.patch_size.filter(|s| s.is_finite()), "two_sided": p.source.two_sided,
+            "light": p.source.light,
         },
         "can_go_on": can_go_on,
         "patches": light.len(), "emitting_patches": sums.emitting, "patches_with_error": sums.known,
@@ -65,7 +66,8 @@ fn source_text(p: &Provenance) -> String {
         (None, None) => "cut as it suggests".to_owned(),
     };
     let unit = if s.metres_per_unit == 1.0 { String::new() } else { format!(", {} m a unit", s.metres_per_unit) };
-    format!("{}, {cut}{unit}{}", s.file, if s.two_sided { ", --two-sided" } else { "" })
+    let light: String = s.light.iter().map(|(name, value)| format!(", --{name} {value}")).collect();
+    format!("{}, {cut}{unit}{}{light}", s.file, if s.two_sided { ", --two-sided" } else { "" })
 }
 
 fn seeds_text(p: &Provenance) -> String {

@@ -10,6 +10,7 @@ mod display;
 mod export;
 mod faults;
 mod interrupt;
+mod lights;
 mod merge;
 mod odd_files;
 mod pictures;

@@ -1,11 +1,12 @@
 //! glTF 2.0, binary and text: from a document to a scene, in the order a reader of the code expects.
 //!
 //! `container` opens the file, `json` finds its way in it, `node` walks the tree, `primitive` and `material`
-//! read what stands there, `write` goes the other way. Called by `read_scene`.
+//! and `light` read what stands there, `write` goes the other way. Called by `read_scene`.
 
 mod accessor;
 mod container;
 mod json;
+mod light;
 mod material;
 mod node;
 mod primitive;
@@ -19,6 +20,7 @@ use twinray_scene::{Environment, Instance, Mesh, Rgb, Scene};
 
 use self::container::Buffers;
 use self::json::Element;
+use self::light::Lights;
 use self::material::{IGNORED, Materials};
 use self::node::Placed;
 use self::primitive::Primitives;
@@ -30,7 +32,8 @@ use crate::warning::name_list;
 pub use self::write::write_glb;
 
 /// Extensions that are read, or whose absence from the result is named where it shows.
-const UNDERSTOOD: [&str; 10] = [
+const UNDERSTOOD: [&str; 11] = [
+    "EXT_lights_ies",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
@@ -64,6 +67,7 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
         buffers: &buffers,
         materials: Materials::default(),
         meshes: HashMap::new(),
+        lights: Lights::default(),
         account: Account::default(),
         scene: Scene::default(),
     };
@@ -91,6 +95,7 @@ struct Content<'v, 'b> {
     materials: Materials,
     /// Our meshes of each mesh of the file: one per primitive with triangles.
     meshes: HashMap<usize, Vec<usize>>,
+    lights: Lights,
     account: Account,
     scene: Scene,
 }
@@ -101,6 +106,7 @@ impl Content<'_, '_> {
         if let Some(camera) = node::camera(context, root, place) {
             self.scene.cameras.push(camera);
         }
+        self.scene.lights.extend(self.lights.at(context, root, self.buffers, place)?);
         let Some((index, mesh)) = place.node.follow("mesh", root, "meshes")? else { return Ok(()) };
         if !self.meshes.contains_key(&index) {
             let meshes = self.read_mesh(context, root, index, &mesh)?;
@@ -225,18 +231,9 @@ fn warn_ignored(context: &mut Context<'_>, root: &Element<'_>, placed: &[Placed<
             .collect();
         context.sum_up("animations", format!("ignored, nodes stay where the file puts them: {}", name_list(&names)));
     }
-    let lights = root.extension("KHR_lights_punctual");
     for place in placed {
         if place.node.get("skin").is_some() {
             context.warn(&place.node.path, "the skin is ignored: the mesh keeps the shape in which it was bound");
         }
-        let Some(link) = place.node.extension("KHR_lights_punctual") else { continue };
-        let light = lights.as_ref().and_then(|root| link.follow("light", root, "lights").ok().flatten());
-        let (name, kind) = match &light {
-            Some((i, light)) => (light.name_or(|| format!("light {i}")), light.text("type").ok().flatten()),
-            None => (place.node.name_or(|| format!("node {}", place.index)), None),
-        };
-        let kind = kind.unwrap_or("punctual").to_owned();
-        context.warn(&place.node.path, format!("{kind} light \"{name}\" is ignored: only surfaces emit so far"));
     }
 }

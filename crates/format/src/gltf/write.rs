@@ -4,22 +4,25 @@
 //! positions, normals, texture coordinates and indices, then the pictures as PNG.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use glam::{DAffine3, DMat3};
 use serde_json::{Map, Value, json};
 use twinray_scene::{
-    Camera, Environment, Material, Mesh, NormalMap, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureRef,
+    Camera, Environment, LightKind, LightProfile, Material, Mesh, NormalMap, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureRef,
     TextureTransform, Transmission, Volume, Wrap,
 };
 
+use crate::ies::write_ies;
 use crate::png::encode_rgba;
 
 /// Writes `scene` as binary glTF 2.0 (`.glb`).
 ///
 /// Emission above 1 uses `KHR_materials_emissive_strength`, pure Lambertian surfaces `KHR_materials_specular` with
-/// factor 0, glass `KHR_materials_transmission` and, for bodies, `KHR_materials_volume`. Phong lobes, which glTF does
+/// factor 0, glass `KHR_materials_transmission` and, for bodies, `KHR_materials_volume`, lights `KHR_lights_punctual` and
+/// `EXT_lights_ies`. Phong lobes, which glTF does
 /// not have, become the metallic-roughness lobe of about the same width, α = √(2/(exponent + 2)); the material's
-/// `extras` note the original values, which `read_scene` finds again, too. Surroundings and the suggested number of patches go to `asset.extras.twinray`, where
+/// `extras` note the original values, which `read_scene` finds again, too. A uniform environment and the suggested number of patches go to `asset.extras.twinray`, where
 /// `read_scene` finds them again. Meshes without triangles are left out.
 ///
 /// # Panics
@@ -56,6 +59,8 @@ pub fn write_glb(scene: &Scene) -> Vec<u8> {
         nodes.push(node);
     }
 
+    let (lights, profiles) = writer.lights(scene, &mut nodes);
+
     let mut asset = json!({ "version": "2.0", "generator": concat!("twinray ", env!("CARGO_PKG_VERSION")) });
     if let Some(extras) = extras(scene) {
         asset["extras"] = extras;
@@ -65,6 +70,12 @@ pub fn write_glb(scene: &Scene) -> Vec<u8> {
     if nodes.is_empty() {
         // Empty arrays are not allowed.
         document["scenes"] = json!([{}]);
+    }
+    for (key, list) in [("EXT_lights_ies", profiles), ("KHR_lights_punctual", lights)] {
+        if !list.is_empty() {
+            document["extensions"][key] = json!({ "lights": list });
+            writer.extensions.insert(key);
+        }
     }
     let cameras = scene.cameras.iter().map(camera).collect();
     let used: Vec<Value> = writer.extensions.iter().map(|name| json!(name)).collect();
@@ -216,6 +227,46 @@ impl Writer {
             out["extensions"] = Value::Object(extensions);
         }
         out
+    }
+
+    /// Adds a node for each light without area; answers with the lists of lights and of profiles.
+    fn lights(&mut self, scene: &Scene, nodes: &mut Vec<Value>) -> (Vec<Value>, Vec<Value>) {
+        let (mut lights, mut profiles) = (Vec::new(), Vec::new());
+        let mut known: Vec<&Arc<LightProfile>> = Vec::new();
+        for light in &scene.lights {
+            // Colours are limited to 1; what is brighter goes into the intensity.
+            let strength = light.intensity.max_channel();
+            let color = if strength > 0.0 { light.intensity / strength } else { Rgb::WHITE };
+            let color = color.map(|c| c.clamp(0.0, 1.0)).to_array();
+            let mut node = json!({ "name": light.name });
+            set_transform(&mut node, &light.transform);
+            if let Some(profile) = &light.profile {
+                let index = known.iter().position(|p| Arc::ptr_eq(p, profile)).unwrap_or_else(|| {
+                    let view = self.view(&write_ies(profile), None);
+                    known.push(profile);
+                    profiles.push(json!({
+                        "name": profile.name, "mimeType": "application/x-ies-lm-63", "bufferView": view,
+                    }));
+                    known.len() - 1
+                });
+                node["extensions"]["EXT_lights_ies"] =
+                    json!({ "light": index, "multiplier": strength, "color": color });
+            } else {
+                let mut out = json!({ "name": light.name, "color": color, "intensity": strength });
+                out["type"] = match light.kind {
+                    LightKind::Point => json!("point"),
+                    LightKind::Directional => json!("directional"),
+                    LightKind::Spot { inner, outer } => {
+                        out["spot"] = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
+                        json!("spot")
+                    }
+                };
+                node["extensions"]["KHR_lights_punctual"] = json!({ "light": lights.len() });
+                lights.push(out);
+            }
+            nodes.push(node);
+        }
+        (lights, profiles)
     }
 
     fn surface(&mut self, material: &Material, out: &mut Value, extensions: &mut Map<String, Value>) {

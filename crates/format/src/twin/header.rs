@@ -14,6 +14,7 @@ pub(super) fn write(solution: &SolutionFile) -> Vec<u8> {
     // The shortest decimal of an f32 is exact in both directions, and short to read; JSON has no infinity.
     let error: Option<f64> = p.relative_error.is_finite().then(|| p.relative_error.to_string().parse().ok()).flatten();
     let settings: Vec<_> = p.settings.iter().map(|(name, value)| [name, value]).collect();
+    let light: Vec<_> = p.source.light.iter().map(|(name, value)| [name, value]).collect();
     let size = p.source.patch_size.map(|s| if s.is_finite() { json!(s) } else { json!("inf") });
     let record = solution.record.as_ref();
     let header = json!({
@@ -22,7 +23,7 @@ pub(super) fn write(solution: &SolutionFile) -> Vec<u8> {
         "scene": p.scene,
         "source": {
             "file": p.source.file, "metres_per_unit": p.source.metres_per_unit, "patches": p.source.patches,
-            "patch_size": size, "two_sided": p.source.two_sided,
+            "patch_size": size, "two_sided": p.source.two_sided, "light": light,
         },
         // A number of 64 bits does not survive every JSON reader.
         "fingerprint": format!("{:016x}", p.fingerprint),
@@ -118,6 +119,7 @@ impl<'a> Header<'a> {
                     None => None,
                 },
                 two_sided: object.get("two_sided")?.as_bool()?,
+                light: pairs(object.get("light")?)?,
             })
         };
         source().ok_or_else(|| self.invalid("source", "where the scene is and how it was cut"))
@@ -153,12 +155,8 @@ impl<'a> Header<'a> {
     }
 
     fn settings(&self) -> Result<Vec<(String, String)>, FormatError> {
-        let pair = |value: &Value| match value.as_array()?.as_slice() {
-            [Value::String(name), Value::String(text)] => Some((name.clone(), text.clone())),
-            _ => None,
-        };
-        let pairs = self.json.get("settings").and_then(Value::as_array).map(|list| list.iter().map(pair).collect());
-        pairs.flatten().ok_or_else(|| self.invalid("settings", "a list of pairs of texts"))
+        let pairs = self.json.get("settings").and_then(pairs);
+        pairs.ok_or_else(|| self.invalid("settings", "a list of pairs of texts"))
     }
 
     fn relative_error(&self) -> Result<f32, FormatError> {
@@ -169,6 +167,15 @@ impl<'a> Header<'a> {
         };
         value.ok_or_else(|| self.invalid("relative_error", "a number of at least 0, or null"))
     }
+}
+
+/// A list of pairs of texts.
+fn pairs(value: &Value) -> Option<Vec<(String, String)>> {
+    let pair = |value: &Value| match value.as_array()?.as_slice() {
+        [Value::String(name), Value::String(text)] => Some((name.clone(), text.clone())),
+        _ => None,
+    };
+    value.as_array()?.iter().map(pair).collect()
 }
 
 /// What a stranger wrote, short enough for a message.

@@ -70,6 +70,9 @@ pub struct SceneSource {
     pub patch_size: Option<f64>,
     /// Whether every surface counts as two-sided.
     pub two_sided: bool,
+    /// How it was lit beside what its file says, in words such as `("sun", "35,180")`; files among them as seen from the
+    /// solution's folder.
+    pub light: Vec<(String, String)>,
 }
 
 /// Ways to find the light of a scene.

@@ -112,6 +112,7 @@ fn everything() -> Scene {
         images: vec![Arc::new(image)],
         cameras: vec![camera, plan],
         environment: Some(Environment::Uniform(Rgb::new(1.0, 2.0, 3.5))),
+        lights: Vec::new(),
         suggested_patches: Some(1234),
         ..Scene::default()
     }

@@ -19,12 +19,14 @@ pub mod bodies;
 
 type Body = fn(&[u8]);
 
-const TARGETS: [(&str, Body); 6] = [
+const TARGETS: [(&str, Body); 8] = [
     ("gltf", bodies::gltf),
     ("glb", bodies::glb),
     ("obj", bodies::obj),
     ("texture", bodies::texture),
     ("picture", bodies::picture),
+    ("map", bodies::map),
+    ("ies", bodies::ies),
     ("solution", bodies::solution),
 ];
 
@@ -58,6 +60,10 @@ fn seeds() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         Ks 0.5 0.5 0.5\nNs 10\nmap_Kd -o 1 1 t.png\nnewmtl b\nKe 1 1 1\nd 0.5\n";
     // The smallest true-colour TGA: a header of 18 bytes and one texel.
     let tga = [&[1u8, 0, 0, 2][..], &[0; 8], &[1, 0, 1, 0, 24, 0], &[10, 20, 30]].concat();
+    let runs = [&[2u8, 2, 0, 8][..], &[136, 5].repeat(3), &[136, 128]].concat();
+    let ies =
+        b"IESNA:LM-63-1995\n[TEST] seed\nTILT=INCLUDE\n1 2\n0 90\n1 .9\n1 900 1.5 3 2 1 2 .1 .2 0\n1 .95 40\n0 45 90\n\
+        0 90\n100 80 10\n100 60,0\n";
     let exr = write_exr(2, 1, &[[1.0, 2.0, 3.0], [0.5, 0.0, 1e6]], None, &[]);
     vec![
         ("gltf", "square.gltf", text.json.to_string().into_bytes()),
@@ -69,6 +75,14 @@ fn seeds() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         ("texture", "dot.tga", tga),
         ("picture", "stripe.png", png(&[[200, 100, 50]; 5])),
         ("picture", "dots.exr", exr),
+        ("map", "dots.exr", write_exr(2, 1, &[[1.0, 2.0, 3.0], [0.5, 0.0, 1e6]], None, &[])),
+        (
+            "map",
+            "runs.hdr",
+            [b"#?RADIANCE\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n", &runs[..], &runs].concat(),
+        ),
+        ("map", "old.hdr", b"#?RADIANCE\n\n+X 1 -Y 4\n\x09\x08\x07\x80\x01\x01\x01\x03".to_vec()),
+        ("ies", "quadrant.ies", ies.to_vec()),
         ("solution", "three.twin", twin::write(&twin::small())),
         ("solution", "waves.twin", twin::write(&twin::solved(&Params::default_preset(1), false))),
         ("solution", "merged.twin", twin::write(&twin::solved(&Params::default_preset(1), true))),

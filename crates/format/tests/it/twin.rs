@@ -36,6 +36,7 @@ pub fn small() -> SolutionFile<'static> {
                 patches: None,
                 patch_size: Some(f64::INFINITY),
                 two_sided: true,
+                light: vec![("sun".into(), "35,180".into())],
             },
             fingerprint: 0xfedc_ba98_7654_3210,
             rays: 1 << 60,
@@ -109,7 +110,8 @@ fn crc(bytes: &[u8]) -> u32 {
 fn header() -> Value {
     json!({ "software": "x", "method": "reference", "scene": "s", "fingerprint": "00000000000000ff", "patches": 1,
         "glossy_patches": 0, "rays": 5, "seed": 6, "part": null, "seeds": [6], "can_go_on": false,
-        "source": { "file": "s.glb", "metres_per_unit": 1, "patches": 7, "patch_size": null, "two_sided": false },
+        "source": { "file": "s.glb", "metres_per_unit": 1, "patches": 7, "patch_size": null, "two_sided": false,
+            "light": [] },
         "settings": [["a", "b"]], "relative_error": null })
 }
 
@@ -126,7 +128,7 @@ fn one_patch(header: &Value, change: (&str, &[u8])) -> Vec<u8> {
         ("hits", "<u4", 1, &one),
     ];
     let changed = |s: (&'static str, &'static str, u32, _)| if s.0 == change.0 { (s.0, s.1, s.2, change.1) } else { s };
-    container(2, &sections.map(changed))
+    container(3, &sections.map(changed))
 }
 
 /// The message must contain each of `words`.
@@ -222,7 +224,7 @@ fn the_layout_is_the_one_described() {
         ("hits", "<u4", 1, b""),
     ];
     let sections = [&[("header", "|u1", 1, more.as_bytes())][..], &empty, &[("news", "|x9", 7, b"some")]].concat();
-    assert!(read(&container(2, &sections)).unwrap().light.is_empty());
+    assert!(read(&container(3, &sections)).unwrap().light.is_empty());
 }
 
 #[test]
@@ -238,11 +240,11 @@ fn damage_is_named() {
     refused(&flipped, &["section", "has been changed", "checksum"]);
     refused(&[&bytes[..], b"more"].concat(), &["4 bytes after its last section"]);
     refused(&container(1, &[]), &["version 1", "reads version 3", "solve again"]);
-    refused(&container(2, &[]), &["no such section", "\"header\""]);
-    refused(&container(2, &[("a", "|u1", 1, b"x"), ("a", "|u1", 1, b"x")]), &["two sections \"a\""]);
-    refused(&container(2, &[("", "|u1", 1, b"x")]), &["ASCII"]);
+    refused(&container(3, &[]), &["no such section", "\"header\""]);
+    refused(&container(3, &[("a", "|u1", 1, b"x"), ("a", "|u1", 1, b"x")]), &["two sections \"a\""]);
+    refused(&container(3, &[("", "|u1", 1, b"x")]), &["ASCII"]);
     let many = vec![("a", "|u1", 1, &b""[..]); 300];
-    refused(&container(2, &many), &["300 sections", "256"]);
+    refused(&container(3, &many), &["300 sections", "256"]);
 }
 
 #[test]
@@ -257,7 +259,7 @@ fn values_that_make_no_sense_are_named() {
     refused(&one_patch(&header(), ("error", &f32::NAN.to_le_bytes())), &["section \"error\", patch 0", "NaN"]);
     refused(&one_patch(&header(), ("emits", &[2])), &["section \"emits\", patch 0", "found 2", "0 or 1"]);
     let shape = |name, kind, columns| {
-        container(2, &[("header", "|u1", 1, header().to_string().as_bytes()), (name, kind, columns, &[0; 8])])
+        container(3, &[("header", "|u1", 1, header().to_string().as_bytes()), (name, kind, columns, &[0; 8])])
     };
     refused(&shape("area", "<f4", 2), &["section \"area\" has 2 of <f4", "1 columns of <f8"]);
     refused(&one_patch(&header(), ("hits", &[0; 8])), &["section \"hits\" has 8 bytes", "1 rows of 4 bytes"]);
@@ -320,6 +322,7 @@ fn any_solution() -> impl Strategy<Value = SolutionFile<'static>> {
                         patches: plain.then_some(rays.max(1)),
                         patch_size: (!plain).then_some(f64::from(bits(error).abs()).max(1e-9)),
                         two_sided: plain,
+                        light: Vec::new(),
                     },
                     fingerprint,
                     rays,
