@@ -133,9 +133,9 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow:
         bail!("{name}: was solved with another {option}: leave it out, or solve the scene anew");
     }
     let stored_light = LightSettings::from_words(name, &source.light, |file| stored::beside(name, file))?;
-    let light = stored_light.repeated(&LightSettings::new(&args.light)?).map_err(|option| {
-        anyhow!("{name}: was solved with another {option}: leave it out, or solve the scene anew")
-    })?;
+    let light = stored_light
+        .repeated(&LightSettings::new(&args.light)?)
+        .map_err(|option| anyhow!("{name}: was solved with another {option}: leave it out, or solve the scene anew"))?;
     source.file = stored::scene_of(name, &source, args.scene_file.as_deref())?;
     let file = source.file.clone();
     let lit = if source.light.is_empty() { "" } else { ", the files that lit it among it" };

@@ -46,8 +46,31 @@ enum Lamp {
     Patches(Range<usize>),
     /// A range of the lights without area.
     Points(Range<usize>),
-    /// The surroundings.
+    /// The surroundings, by what they send.
     Sky,
+    /// One of the equal parts of all directions, evenly: windows show a few of them to a room.
+    SkyPart(usize),
+}
+
+/// Parts of all directions: rows of equal height, columns of equal longitude.
+const SKY_PARTS: [usize; 2] = [16, 32];
+/// Density per solid angle of directions within a part.
+const PART_DENSITY: f64 = (SKY_PARTS[0] * SKY_PARTS[1]) as f64 / (4.0 * PI);
+
+/// The part that holds a direction.
+fn sky_part(towards: DVec3) -> usize {
+    let row = ((0.5 * (1.0 + towards.y) * SKY_PARTS[0] as f64) as usize).min(SKY_PARTS[0] - 1);
+    let turn = (libm::atan2(towards.z, towards.x) / (2.0 * PI)).rem_euclid(1.0);
+    row * SKY_PARTS[1] + ((turn * SKY_PARTS[1] as f64) as usize).min(SKY_PARTS[1] - 1)
+}
+
+/// A direction in a part, even by solid angle.
+fn direction_in(part: usize, [s, t]: [f64; 2]) -> DVec3 {
+    let (row, column) = ((part / SKY_PARTS[1]) as f64, (part % SKY_PARTS[1]) as f64);
+    let y = 2.0 * (row + s) / SKY_PARTS[0] as f64 - 1.0;
+    let (sin, cos) = libm::sincos(2.0 * PI * (column + t) / SKY_PARTS[1] as f64);
+    let r = (1.0 - y * y).max(0.0).sqrt();
+    DVec3::new(r * cos, y, r * sin)
 }
 
 /// Probabilities of the lamps.
@@ -97,7 +120,7 @@ pub(crate) struct LightSample {
     pub radiance: Rgb,
     /// The point that shines and its unit normal; `None` for the sky.
     pub end: Option<(DVec3, DVec3)>,
-    /// Number of the lamp.
+    /// Number of the lamp that should be chosen for it.
     pub lamp: usize,
     /// True if only a shadow ray can find it.
     pub is_sharp: bool,
@@ -131,9 +154,12 @@ impl<'a> Lights<'a> {
                 (scene.lights()[range.start].is_distant(), luminance(&scene.lights()[range.clone()]))
             }
             Lamp::Sky => (true, scene.environment().map_or(0.0, |sky| sky.power().luminance())),
+            // Only who has learnt which of them are to be seen chooses parts.
+            Lamp::SkyPart(_) => (true, 0.0),
         };
         if scene.environment().is_some() {
             lamps.push(Lamp::Sky);
+            lamps.extend((0..SKY_PARTS[0] * SKY_PARTS[1]).map(Lamp::SkyPart));
         }
         let powers: Vec<(bool, f64)> = lamps.iter().map(of).collect();
         let total = |far: bool| powers.iter().filter(|p| p.0 == far).map(|p| p.1).sum::<f64>();
@@ -172,11 +198,15 @@ impl<'a> Lights<'a> {
         let range = match &self.lamps[lamp] {
             Lamp::Patches(range) => range,
             Lamp::Points(range) => return self.sample_points(range, by.probability(lamp), lamp, point, within),
-            Lamp::Sky => {
+            Lamp::Sky | Lamp::SkyPart(_) => {
                 let sky = self.scene.environment()?;
-                let towards = sky.sample_direction([s, t]);
-                let density = by.probability(lamp) * sky.pdf_direction(towards);
+                let towards = match self.lamps[lamp] {
+                    Lamp::SkyPart(part) => direction_in(part, [s, t]),
+                    _ => sky.sample_direction([s, t]),
+                };
+                let density = self.sky_density_by(by, towards);
                 let radiance = sky.radiance(towards);
+                let lamp = self.sky_lamp(towards)?;
                 return Some(LightSample { towards, density, radiance, end: None, lamp, is_sharp: false });
             }
         };
@@ -231,9 +261,8 @@ impl<'a> Lights<'a> {
         if self.scene.emission(patch).luminance() <= 0.0 {
             return 0.0;
         }
-        let Ok(index) = self.patches.binary_search(&patch) else { return 0.0 };
-        let lamp = self.lamps.partition_point(|l| matches!(l, Lamp::Patches(range) if range.end <= index));
-        let Some(Lamp::Patches(range)) = self.lamps.get(lamp) else { return 0.0 };
+        let Some(lamp) = self.lamp_of(patch) else { return 0.0 };
+        let Lamp::Patches(range) = &self.lamps[lamp] else { return 0.0 };
         self.solid_angle_density(by.probability(lamp) / self.power(range), point, patch, end)
     }
 
@@ -250,7 +279,8 @@ impl<'a> Lights<'a> {
 
     /// How many candidates are worth their while where one of them is chosen: many lamps need many.
     pub fn candidates(&self) -> u32 {
-        (self.lamps.len() as u32).clamp(1, MOST_CANDIDATES)
+        let lamps = self.lamps.iter().filter(|l| !matches!(l, Lamp::SkyPart(_))).count();
+        (lamps as u32).clamp(1, MOST_CANDIDATES)
     }
 
     /// Density per solid angle with which [`Lights::sample`] chooses `towards` for the sky.
@@ -260,8 +290,31 @@ impl<'a> Lights<'a> {
 
     /// The same of [`Lights::sample_by`].
     pub fn sky_density_by(&self, by: &Choice, towards: DVec3) -> f64 {
-        let Some(lamp) = self.lamps.iter().rposition(|l| *l == Lamp::Sky) else { return 0.0 };
-        self.scene.environment().map_or(0.0, |sky| by.probability(lamp) * sky.pdf_direction(towards))
+        let Some(sky) = self.scene.environment().filter(|_| !self.lamps.is_empty()) else { return 0.0 };
+        let whole = self.first_sky();
+        by.probability(whole) * sky.pdf_direction(towards)
+            + by.probability(whole + 1 + sky_part(towards)) * PART_DENSITY
+    }
+
+    /// The lamp that a patch is a part of.
+    pub fn lamp_of(&self, patch: PatchId) -> Option<usize> {
+        let index = self.patches.binary_search(&patch).ok()?;
+        let lamp = self.lamps.partition_point(|l| matches!(l, Lamp::Patches(range) if range.end <= index));
+        (lamp < self.lamps.len()).then_some(lamp)
+    }
+
+    /// The lamp that should be chosen for a direction of the sky: a part of it, but for the sun and its like, which are too
+    /// small to be found within a part.
+    pub fn sky_lamp(&self, towards: DVec3) -> Option<usize> {
+        let sky = self.scene.environment().filter(|_| !self.lamps.is_empty())?;
+        let whole = self.first_sky();
+        let is_peak = sky.pdf_direction(towards) > PART_DENSITY;
+        Some(if is_peak { whole } else { whole + 1 + sky_part(towards) })
+    }
+
+    /// Number of the lamp that is the sky as a whole; its parts follow.
+    fn first_sky(&self) -> usize {
+        self.lamps.len() - 1 - SKY_PARTS[0] * SKY_PARTS[1]
     }
 
     fn before(&self, range: &Range<usize>) -> f64 {
@@ -402,10 +455,12 @@ mod tests {
     }
 
     /// Samples from a point in the cube, all of whose faces shine, some under a sky as well, against the density of
-    /// what a ray meets in each direction. 3 tests, each with a false-alarm rate of 1 %.
+    /// what a ray meets in each direction. 5 tests, each with a false-alarm rate of 1 %.
     #[test]
     fn samples_follow_their_density() {
-        for (sky, open) in [(false, false), (true, true), (true, false)] {
+        for (sky, open, even) in
+            [(false, false, false), (true, true, false), (true, false, false), (false, false, true), (true, true, true)]
+        {
             let mut authored = builtin::cube(0.5);
             for (i, material) in authored.materials.iter_mut().enumerate() {
                 material.emission = Rgb::grey(1.0 + i as f64);
@@ -418,24 +473,27 @@ mod tests {
             let scene = PatchScene::new(&authored, PatchOptions::default()).unwrap();
             let lights = Lights::new(&scene);
             let point = DVec3::new(0.13, -0.21, 0.08);
+            // As places choose that have learnt: parts of the sky beside the whole of it.
+            let evenly = Choice::new(&vec![1.0; lights.len()]).unwrap();
+            let by = if even { &evenly } else { lights.by_power() };
             let mut random = Stream::new(3, 0, 0);
             let samples = (0..400_000).map(|_| {
                 let [choice, s, t] = std::array::from_fn(|_| random.uniform());
-                let sample = lights.sample(point, choice, [s, t])?;
+                let sample = lights.sample_by(by, point, choice, [s, t])?;
                 // A sky behind walls is sampled too; the density below is that of what a ray meets.
                 let hit = scene.trace(point, sample.towards);
                 (hit.is_none() == sample.end.is_none()).then(|| sample.towards.to_array())
             });
             let density = |d: [f64; 3]| {
                 let d = DVec3::from_array(d);
-                scene.trace(point, d).map_or(lights.sky_density(d), |hit| {
+                scene.trace(point, d).map_or(lights.sky_density_by(by, d), |hit| {
                     let patch = scene.patch_of(&hit).expect("only fronts are seen from within");
-                    lights.density(point, patch, scene.point_of(hit.triangle, hit.u, hit.v))
+                    lights.density_by(by, point, patch, scene.point_of(hit.triangle, hit.u, hit.v))
                 })
             };
             let p = chi2::sphere(samples, density, 10, 20).p_value;
-            println!("sky {sky}, open {open}: p = {p:.3}");
-            assert!(p > 0.01, "sky {sky}, open {open}: p = {p}");
+            println!("sky {sky}, open {open}, even {even}: p = {p:.3}");
+            assert!(p > 0.01, "sky {sky}, open {open}, even {even}: p = {p}");
         }
     }
 }

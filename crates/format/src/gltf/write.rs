@@ -9,8 +9,8 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3};
 use serde_json::{Map, Value, json};
 use twinray_scene::{
-    Camera, Environment, LightKind, LightProfile, Material, Mesh, NormalMap, Opacity, Projection, Rgb, Scene, Surface, Texel, TextureRef,
-    TextureTransform, Transmission, Volume, Wrap,
+    Camera, Environment, LightKind, LightProfile, Material, Mesh, NormalMap, Opacity, Projection, Rgb, Scene, Surface,
+    Texel, TextureRef, TextureTransform, Transmission, Volume, Wrap,
 };
 
 use crate::ies::write_ies;

@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use twinray_scene::sample::PixelSample;
+use twinray_scene::sample::stream::mix;
 
 use super::Gather;
 use super::places::{EDGE, Lessons};
@@ -25,6 +26,12 @@ const MOST: f64 = 16.0;
 const LEAST: f64 = 0.25;
 /// Of the mean luminance, what is added to a place's where errors are relative.
 const DARK: f64 = 0.05;
+/// Batches that only learn.
+const LEARNING: u32 = 2;
+/// Lamps among which nothing need be learnt before.
+const FEW_LAMPS: usize = 8;
+/// Keeps the numbers of these batches apart.
+const LESSONS: u64 = 0x1E55_0115;
 /// Where tiles begin, batch after batch, or what neighbours share would show as squares: offsets to the left and upwards, in
 /// an order that leaves no two alike neighbours.
 const OFFSETS: [usize; SIDE] = [0, 2, 1, 3];
@@ -52,6 +59,9 @@ impl Gather<'_> {
         let pixels = self.pixels.len().max(1) as f64;
         let per_pixel = |rays: u64| rays as f64 / pixels / f64::from(BATCH);
         let wished = (samples / f64::from(BATCH)).max(1.0);
+        if self.batches == 0 {
+            self.learn();
+        }
         let done = per_pixel(self.rays);
         if done < FIRST as f64 || !self.adaptive {
             // Whole passes, one batch at a time: places learn from each.
@@ -66,6 +76,22 @@ impl Gather<'_> {
             let plan = self.plan((wished - done) * pixels);
             self.pass(&plan);
         }
+    }
+
+    /// Learns which lamps light which place, where there are many. What these rays saw is forgotten: they looked for lamps
+    /// nearly everywhere, and their noise would stay in the picture.
+    fn learn(&mut self) {
+        if self.estimator.lights.len() <= FEW_LAMPS {
+            return;
+        }
+        let all = vec![1; self.places.size().0 * self.places.size().1];
+        let seed = self.seed;
+        // Numbers of their own: what is learnt must not know what it is used for.
+        self.seed = mix(seed ^ LESSONS);
+        (0..LEARNING).for_each(|_| self.pass(&all));
+        self.seed = seed;
+        self.pixels.iter_mut().for_each(|p| *p = PixelSums::default());
+        self.rays = 0;
     }
 
     /// Batches for every place, about `budget` batches of pixels in all.
@@ -101,14 +127,23 @@ impl Gather<'_> {
         }
         // What is left of a whole batch is carried on, so that the sum is right.
         let mut carried = 0.0;
-        (0..known.len())
+        let mut plan: Vec<u32> = (0..known.len())
             .map(|t| {
                 carried += (due(high, t) - known[t].batches) * known[t].pixels;
                 let batches = (carried / known[t].pixels).floor().max(0.0);
                 carried -= batches * known[t].pixels;
                 batches as u32
             })
-            .collect()
+            .collect();
+        // A wish for a little more is never in vain: whoever waits for it would wait for ever.
+        if plan.iter().all(|n| *n == 0) {
+            let most_due = (0..known.len()).max_by(|&a, &b| {
+                let missing = |t: usize| due(high, t) - known[t].batches;
+                missing(a).total_cmp(&missing(b)).then(b.cmp(&a))
+            });
+            most_due.into_iter().for_each(|t| plan[t] = 1);
+        }
+        plan
     }
 
     /// What is known of a place.

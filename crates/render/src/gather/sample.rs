@@ -74,6 +74,8 @@ pub(super) struct Gathered {
     pub density: f64,
     /// Radiance of what emits where the ray ends, weighed against shadow rays.
     pub emitted: Rgb,
+    /// The lamp that this is a part of.
+    pub lamp: Option<usize>,
     /// Radiance that the far end scatters, and where: others may take it as well.
     pub scattered: Option<(Rgb, DVec3, DVec3)>,
     /// All other radiance.
@@ -161,7 +163,8 @@ impl<'a> Estimator<'a> {
         if !(normal.dot(direction) > 0.0 && density > 0.0 && geometric.dot(direction) > 0.0) {
             return None;
         }
-        let mut gathered = Gathered { direction, density, emitted: Rgb::BLACK, scattered: None, other: Rgb::BLACK };
+        let mut gathered =
+            Gathered { direction, density, emitted: Rgb::BLACK, lamp: None, scattered: None, other: Rgb::BLACK };
         let before = Before { point: point.vertex.point, density, distance: 0.0, lit: Some(shadows) };
         self.follow(&point.vertex, before, direction, numbers, &mut gathered);
         Some(gathered)
@@ -190,6 +193,9 @@ impl<'a> Estimator<'a> {
                 if let Some(sky) = scene.environment() {
                     let weight = self.weight(&before, |by| self.lights.sky_density_by(by.choice, direction));
                     let light = throughput * sky.radiance(direction) * weight;
+                    if met == 0 {
+                        gathered.lamp = self.lights.sky_lamp(direction);
+                    }
                     *(if met == 0 { &mut gathered.emitted } else { &mut radiance }) += light;
                 }
                 break;
@@ -207,6 +213,9 @@ impl<'a> Estimator<'a> {
             if !emitted.is_black() {
                 let density = |by: Shadows| self.lights.density_by(by.choice, before.point, patch, vertex.point);
                 let light = throughput * emitted * self.weight(&before, density);
+                if met == 0 {
+                    gathered.lamp = self.lights.lamp_of(patch);
+                }
                 *(if met == 0 { &mut gathered.emitted } else { &mut radiance }) += light;
             }
             let event = numbers.pair();

@@ -93,6 +93,10 @@ impl Tile<'_> {
             let slot = pixel.y % SIDE * SIDE + pixel.x % SIDE;
             let u = net_point(mix(self.seed ^ mix(square)), dealt(before[n] + k, slot));
             work.gathered = estimator.gather(point, u, shadows, &mut numbers);
+            // What the BRDF's own ray found of a lamp is a lesson too: the rest of what it gives here.
+            if let Some(Gathered { lamp: Some(lamp), emitted, direction, density, .. }) = work.gathered {
+                learn(pixel, lamp, (reflected(point, direction) * emitted).luminance() / density);
+            }
         }
         self.share(&mut work);
         for (work, seen) in work.iter().zip(seen) {
@@ -145,7 +149,7 @@ fn members(group: u32) -> impl Iterator<Item = usize> + Clone {
 fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
     for i in members(group) {
         let (Some(point), Some(gathered)) = (work[i].sight.point, work[i].gathered) else { continue };
-        let Gathered { direction, density, emitted, scattered, other } = gathered;
+        let Gathered { direction, density, emitted, scattered, other, .. } = gathered;
         let own = reflected(&point, direction) / density;
         work[i].direct += own * emitted;
         work[i].indirect += limited(&point, own * other, CAUSTIC);

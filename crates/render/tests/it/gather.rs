@@ -129,6 +129,32 @@ fn threads_do_not_change_a_bit() {
     assert_eq!(one, picture(7));
 }
 
+/// However small the film, and however little is wished for, a wish is fulfilled.
+#[test]
+fn small_films_get_on() {
+    let authored = builtin::cornell(false);
+    let scene = cut(&authored, 500);
+    let solution = solved(&scene, 20_000);
+    for (width, height) in [(1, 1), (3, 4), (17, 1), (40, 23)] {
+        for adaptive in [true, false] {
+            let options = GatherOptions { width, height, adaptive, ..GatherOptions::default() };
+            let mut gather = Gather::new(&scene, &solution, &authored.cameras[0], &options);
+            for step in 1..=200 {
+                let before = gather.samples();
+                let wish = (1.25 * before).clamp(8.0, 64.0);
+                gather.advance_to(wish);
+                assert!(gather.samples() > before, "{width}x{height}: nothing comes of a wish for {wish}");
+                if gather.samples() >= 63.9 {
+                    break;
+                }
+                assert!(step < 200);
+            }
+            assert!(gather.samples() < 72.0 || width * height < 256, "{}", gather.samples());
+            assert!(gather.picture().image.pixels.iter().flatten().all(|c| c.is_finite()));
+        }
+    }
+}
+
 /// A part of the film shows what the whole shows there.
 #[test]
 fn crops_are_parts() {
