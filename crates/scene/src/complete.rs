@@ -51,7 +51,8 @@ pub fn complete(scene: &mut Scene, camera: Option<&Camera>, two_sided: bool) -> 
         additions.push(Addition::Camera);
     }
     if !lit {
-        let view = camera.unwrap_or(&scene.cameras[0]).clone();
+        // One of the two there is; the scene's only where the user asked for none.
+        let view = camera.unwrap_or_else(|| &scene.cameras[0]).clone();
         if sky_reaches(&patches, view.eye - patches.centre()) {
             scene.environment = Some(Environment::Uniform(Rgb::WHITE));
             additions.push(Addition::Sky);
@@ -322,5 +323,15 @@ mod tests {
         scene.materials.iter_mut().for_each(|m| m.emission = Rgb::BLACK);
         assert_eq!(complete(&mut scene, None, false).unwrap(), [Addition::Sky]);
         assert_eq!(complete(&mut scene, None, false).unwrap(), []);
+    }
+
+    /// As `--eye` and `--target` do for a file that has neither cameras nor light.
+    #[test]
+    fn a_wanted_camera_needs_none_of_the_scene() {
+        let mut scene = builtin::cornell(false);
+        let camera = scene.cameras.remove(0);
+        scene.cameras.clear();
+        scene.materials.iter_mut().for_each(|m| m.emission = Rgb::BLACK);
+        assert_eq!(complete(&mut scene, Some(&camera), false).unwrap(), [Addition::Sky]);
     }
 }
