@@ -106,7 +106,12 @@ impl PatchScene {
         let mut medium = start.and_then(|p| self.body_of(self.triangle_of(p)));
         let mut first_index = None;
         for _ in 0..=MOST_PASSED {
-            let Some(met) = hit else { return Arrival { end: End::Sky, ..ray } };
+            let Some(met) = hit else {
+                // What the ray left last is not where it is now.
+                let index = medium.map_or(1.0, |b: Body| b.ior);
+                let index_ratio = (first_index.unwrap_or(index) / index).powi(2);
+                return Arrival { end: End::Sky, index_ratio, ..ray };
+            };
             let Some(patch) = self.patch_of(&met) else { return Arrival { end: End::Back, ..ray } };
             if !self.has_specular() {
                 return Arrival { end: End::Patch(patch), ..ray };

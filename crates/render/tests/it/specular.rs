@@ -1,7 +1,10 @@
 //! Mirrors and glass: the solver's rays against the path tracer's, and the light that neither may lose.
 
+use glam::DVec3;
 use twinray_render::reference::{self, IrradianceOptions};
 use twinray_scene::brdf::Event;
+use twinray_scene::passing::End;
+use twinray_scene::sample::Stream;
 use twinray_scene::{Rgb, Scene, Surface, Texel, Transmission, Volume, builtin};
 use twinray_solve::{Params, Solver};
 
@@ -113,4 +116,29 @@ fn specular_surfaces_know_what_goes_on() {
         let all = brdf.albedo(cosine) + specular.passed(cosine, false);
         assert!(all.max_channel() < 1.0, "a coat over a base of .7 absorbs: {all:?}");
     }
+}
+
+/// Whoever comes to the sky through a body of glass is in the air again, and so are its radiance and densities: otherwise rays
+/// to the sky bring less of its light than rays from there.
+#[test]
+fn the_sky_behind_glass_is_seen_from_the_air() {
+    let scene = cut(&cornell_with(Boxes::Glass, false), 500);
+    // Boxes have no bottoms: from the floor, rays may start within.
+    let is_wall = |n: DVec3| n.y < 0.5;
+    let mut bent = 0;
+    for patch in
+        scene.patches().filter(|&p| is_wall(scene.normal(p)) && scene.passed_share(p, scene.normal(p)).is_black())
+    {
+        let (n, mut random) = (scene.normal(patch), Stream::new(3, 0, u64::from(patch.0)));
+        for _ in 0..20 {
+            let direction = DVec3::from_array(std::array::from_fn(|_| random.uniform() - 0.5)).normalize();
+            let direction = if n.dot(direction) < 0.0 { -direction } else { direction };
+            let arrival = scene.trace_through(Some(patch), scene.cell_centre(patch), direction, || random.uniform());
+            if arrival.end == End::Sky {
+                bent += u32::from(arrival.direction != direction);
+                assert_eq!(arrival.index_ratio, 1.0, "from {patch:?} towards {direction}");
+            }
+        }
+    }
+    assert!(bent > 20, "only {bent} rays came through glass to the sky");
 }
