@@ -4,6 +4,7 @@
 //! that the only shadow ray goes where it matters (Talbot, Cline, Egbert, "Importance resampling for global
 //! illumination", EGSR 2005).
 
+use glam::DVec3;
 use twinray_scene::brdf::Towards;
 use twinray_scene::{PatchScene, Rgb};
 
@@ -17,6 +18,13 @@ pub(crate) struct Shadows<'a> {
     pub choice: &'a Choice,
     /// Candidates for one shadow ray.
     pub candidates: u32,
+}
+
+/// True if a path that was scattered into `heading` and passed clear glass arrives in `direction` as a shadow ray would.
+#[inline]
+pub(crate) fn is_straight(heading: DVec3, direction: DVec3) -> bool {
+    // Rounding tilts by far less, and faces that are not parallel by far more.
+    heading.dot(direction) > 1.0 - 1e-8
 }
 
 /// Weights of a shadow ray and of the BRDF's own ray in a direction that have these densities: the power heuristic with

@@ -19,6 +19,8 @@ pub(crate) struct Vertex {
     pub scatter: Scatter,
     /// Whether the back was met: of glass, from within.
     pub inside: bool,
+    /// Whether it is clear glass for shadow rays.
+    pub is_clear: bool,
 }
 
 /// How normals and lobes are to be.
@@ -42,8 +44,8 @@ pub(crate) struct Way {
     pub factor: Rgb,
     /// What attenuates it, 1/m.
     pub medium: Option<Rgb>,
-    /// True if it goes straight on through a pane, as shadow rays do.
-    pub straight: bool,
+    /// True if it passes clear glass, as shadow rays do where they come out in the direction in which they went in.
+    pub clear: bool,
 }
 
 /// What happens to a path at a surface.
@@ -70,7 +72,10 @@ impl Vertex {
             Look::Patch => (scene.scatter(patch), geometric),
         };
         let point = scene.point_of(hit.triangle, hit.u, hit.v);
-        Self { patch, point, geometric, normal, scatter, inside: hit.side == Side::Back }
+        // Glass that is only nearly clear is clear to the solver, but not to shadow rays.
+        let is_clear = scatter.specular.is_some_and(|s| s.is_clear())
+            && (look != Look::Patch || scene.scatter_at(hit, Detail::Picture).specular.is_some_and(|s| s.is_clear()));
+        Self { patch, point, geometric, normal, scatter, inside: hit.side == Side::Back, is_clear }
     }
 
     /// The first surface on the way in `direction`, on this side or `beyond`.
@@ -100,7 +105,7 @@ impl Vertex {
                 let smooth = mirrored(self.normal, wo);
                 let direction = if smooth.dot(self.geometric) > 0.0 { smooth } else { mirrored(self.geometric, wo) };
                 let medium = specular.attenuation().filter(|_| self.inside);
-                Step::On(Way { direction, beyond: false, factor, medium, straight: false })
+                Step::On(Way { direction, beyond: false, factor, medium, clear: false })
             }
             Event::Transmit => {
                 let Some((direction, weight)) = specular.refract_rough(self.normal, wo, self.inside, blur()) else {
@@ -110,13 +115,12 @@ impl Vertex {
                     return Step::End;
                 }
                 let medium = specular.attenuation().filter(|_| !self.inside);
-                let straight = specular.is_pane();
                 Step::On(Way {
                     direction,
                     beyond: true,
                     factor: factor * (weight * specular.radiance_ratio(self.inside)),
                     medium,
-                    straight,
+                    clear: self.is_clear,
                 })
             }
         }

@@ -107,10 +107,9 @@ impl PatchScene {
         let mut first_index = None;
         for _ in 0..=MOST_PASSED {
             let Some(met) = hit else {
-                // What the ray left last is not where it is now.
-                let index = medium.map_or(1.0, |b: Body| b.ior);
-                let index_ratio = (first_index.unwrap_or(index) / index).powi(2);
-                return Arrival { end: End::Sky, index_ratio, ..ray };
+                // The sky is in the air, whatever the ray left last.
+                let index: f64 = first_index.unwrap_or(1.0);
+                return Arrival { end: End::Sky, index_ratio: index * index, ..ray };
             };
             let Some(patch) = self.patch_of(&met) else { return Arrival { end: End::Back, ..ray } };
             if !self.has_specular() {

@@ -229,7 +229,7 @@ impl PatchScene {
             kernel: twinray_rays::Bvh::build(&kernel_input),
             holes: false,
             passes: false,
-            panes: scene.materials.iter().any(|m| m.transmission.as_ref().is_some_and(|t| t.volume.is_none())),
+            panes: scene.materials.iter().any(|m| m.transmission.is_some()),
             environment: scene.environment.clone().map(|e| EnvironmentLight::new(e, radius)),
             lights: scene.lights.iter().map(|light| PointLight::new(light, centre, radius)).collect(),
             owner,
@@ -462,9 +462,9 @@ impl PatchScene {
         !matches!(self.materials[t.material as usize].surface, Surface::Lambertian { .. })
     }
 
-    /// True if a straight line of sight may pass some panes.
+    /// True if a straight line of sight may pass some panes or bodies of glass.
     #[inline]
-    pub fn has_panes(&self) -> bool {
+    pub fn has_clear_glass(&self) -> bool {
         self.panes
     }
 

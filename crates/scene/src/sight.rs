@@ -1,15 +1,18 @@
 //! What a straight line of sight lets through: nothing beyond surfaces, a part beyond clear panes.
 //!
-//! Panes do not bend light, so that shadow rays may follow it through them. Not here: bodies of glass, behind which only
-//! paths that are bent find light.
+//! Panes do not bend light, so that shadow rays may follow it through them. Bodies of glass with parallel faces, as windows
+//! are often drawn, let it out in the direction in which it came, a little aside, which is neglected. Not here: other
+//! bodies of glass, behind which only paths that are bent find light.
 
 use glam::DVec3;
 
-use crate::brdf::Detail;
+use crate::brdf::{Detail, Specular, attenuated};
 use crate::bvh::SurfaceHit;
 use crate::patch::{PatchId, PatchScene, Side};
 use crate::rgb::Rgb;
 
+/// Cosine between the normals of parallel faces.
+const PARALLEL: f64 = 1.0 - 1e-9;
 /// Panes behind each other that are looked through.
 const MOST_PANES: u32 = 16;
 
@@ -17,7 +20,7 @@ impl PatchScene {
     /// The share of light that passes the open segment between two points above surfaces: 0 or 1 but for panes. The
     /// points are lifted along the given unit normals as in [`PatchScene::visible`].
     pub fn transmittance(&self, a: DVec3, normal_a: DVec3, b: DVec3, normal_b: DVec3) -> Rgb {
-        if !self.has_panes() {
+        if !self.has_clear_glass() {
             return if self.visible(a, normal_a, b, normal_b) { Rgb::WHITE } else { Rgb::BLACK };
         }
         let [from, to] = [self.lifted(a, normal_a), self.lifted(b, normal_b)];
@@ -28,7 +31,7 @@ impl PatchScene {
     /// The share of light that reaches `point` on `patch` from infinitely far away in direction `towards`.
     pub fn transmittance_from_sky(&self, patch: PatchId, point: DVec3, towards: DVec3) -> Rgb {
         let hit = self.trace_from(patch, point, towards);
-        if !self.has_panes() {
+        if !self.has_clear_glass() {
             return if hit.is_none() { Rgb::WHITE } else { Rgb::BLACK };
         }
         self.through_panes(point, towards, hit, f64::INFINITY)
@@ -38,10 +41,29 @@ impl PatchScene {
     fn through_panes(&self, origin: DVec3, direction: DVec3, first: Option<SurfaceHit>, end: f64) -> Rgb {
         let length = direction.length();
         let (mut share, mut hit, mut gone) = (Rgb::WHITE, first, 0.0);
+        // The face by which the ray entered a body of glass.
+        let mut entered: Option<SurfaceHit> = None;
         for _ in 0..MOST_PANES {
-            let Some(met) = hit.filter(|h| gone + h.t < end) else { return share };
-            let Some(passed) = self.pane_transmittance(&met, direction / length) else { return Rgb::BLACK };
-            share = share * passed;
+            let Some(met) = hit.filter(|h| gone + h.t < end) else {
+                return if entered.is_none() { share } else { Rgb::BLACK };
+            };
+            let Some(specular) = self.clear_glass(&met) else { return Rgb::BLACK };
+            let cosine = self.triangles[met.triangle as usize].normal.dot(direction / length).abs();
+            if specular.is_pane() {
+                share = share * specular.throughput(cosine, met.side == Side::Back)[1];
+            } else {
+                // Both faces see the angle that there is outside.
+                share = share * specular.throughput(cosine, false)[1];
+                match (entered, met.side) {
+                    (None, Side::Front) => entered = Some(met),
+                    (Some(face), Side::Back) if self.are_parallel(&face, &met) => {
+                        let way = met.t * length * specular.stretch(cosine);
+                        share = share * specular.attenuation().map_or(Rgb::WHITE, |a| attenuated(a, way));
+                        entered = None;
+                    }
+                    _ => return Rgb::BLACK,
+                }
+            }
             if share.is_black() {
                 return Rgb::BLACK;
             }
@@ -53,12 +75,15 @@ impl PatchScene {
         Rgb::BLACK
     }
 
-    /// What a pane lets through of light along `direction`; `None` if it is none.
-    fn pane_transmittance(&self, hit: &SurfaceHit, direction: DVec3) -> Option<Rgb> {
-        let triangle = &self.triangles[hit.triangle as usize];
-        self.materials[triangle.material as usize].transmission.as_ref()?;
-        let specular = self.scatter_at(hit, Detail::Picture).specular.filter(|s| s.is_pane())?;
-        let cosine = triangle.normal.dot(direction).abs();
-        Some(specular.throughput(cosine, hit.side == Side::Back)[1])
+    /// What a surface lets through clearly; `None` if it does not.
+    fn clear_glass(&self, hit: &SurfaceHit) -> Option<Specular> {
+        self.material_at(hit.triangle).transmission.as_ref()?;
+        self.scatter_at(hit, Detail::Picture).specular.filter(|s| s.is_clear())
+    }
+
+    /// True if what enters by one face leaves by the other as it came.
+    fn are_parallel(&self, entered: &SurfaceHit, left: &SurfaceHit) -> bool {
+        let normal = |hit: &SurfaceHit| self.triangles[hit.triangle as usize].normal;
+        normal(entered).dot(normal(left)) < -PARALLEL
     }
 }

@@ -50,7 +50,9 @@ pub(crate) fn filtered(
         let [column, row] = [wrapped(x, size[0], texture.wrap[0]), wrapped(y, size[1], texture.wrap[1])];
         texel(row as usize * size[0] as usize + column as usize)
     };
-    let (x, y) = (u * f64::from(size[0]), v * f64::from(size[1]));
+    // Coordinates beyond all numbers have no place; any will do, but no NaN must come of them.
+    let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
+    let (x, y) = (finite(u * f64::from(size[0])), finite(v * f64::from(size[1])));
     if texture.nearest {
         return at(x.floor(), y.floor());
     }
@@ -126,6 +128,16 @@ mod tests {
         let moved = TextureTransform { offset: [0.5, 0.0], ..TextureTransform::default() };
         let texture = TextureRef { transform: moved, ..reference(Wrap::Repeat) };
         assert_eq!(lookup(&two_texels(), &texture, Encoding::Linear, 0.25, 0.5).0.r, 1.0);
+    }
+
+    #[test]
+    fn coordinates_without_end_give_some_colour() {
+        for u in [f64::INFINITY, f64::NAN, 1e308, -1e308] {
+            for wrap in [Wrap::Clamp, Wrap::Repeat, Wrap::Mirror] {
+                let (color, alpha) = lookup(&two_texels(), &reference(wrap), Encoding::Srgb, u, u);
+                assert!(color.is_finite() && alpha.is_finite(), "{u} {wrap:?}");
+            }
+        }
     }
 
     #[test]

@@ -59,8 +59,10 @@ pub(super) fn run(
     let balance = solution.balance();
     let mut warnings = loaded.warnings.clone();
     let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
-    commands::print_warnings(loss.as_slice(), args.load.quiet);
-    warnings.extend(loss);
+    let dropped = commands::invalid_warning(solution.invalid_deposits(), "deposits");
+    let remarks: Vec<String> = loss.into_iter().chain(dropped.map(|w| format!("{}: {w}", args.load.scene))).collect();
+    commands::print_warnings(&remarks, args.load.quiet);
+    warnings.extend(remarks);
     if !args.load.quiet {
         crate::say!("{}", commands::balance_line(&balance));
         crate::say!(
@@ -116,15 +118,19 @@ pub(super) fn run(
     );
     output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
+    let dropped = commands::invalid_warning(gather.invalid(), "camera rays");
+    let dropped: Vec<String> = dropped.map(|w| format!("{}: {w}", args.load.scene)).into_iter().collect();
+    commands::print_warnings(&dropped, args.load.quiet);
+    warnings.extend(dropped);
     let error = gather.relative_error();
     let camera_rate = gather.rays() as f64 / gathering.max(1e-9);
     if !args.load.quiet {
         crate::say!(
-            "{}: {:.1} camera rays per pixel in {gathering:.1} s ({:.2} M/s), estimated noise of a pixel {:.2} %; exposure {:+.2} EV",
+            "{}: {:.1} camera rays per pixel in {gathering:.1} s ({:.2} M/s), estimated noise of a pixel {}; exposure {:+.2} EV",
             path.display(),
             gather.samples(),
             camera_rate * 1e-6,
-            100.0 * error,
+            if error.is_finite() { format!("{:.2} %", 100.0 * error) } else { "unknown".to_owned() },
             factor.log2(),
         );
     }

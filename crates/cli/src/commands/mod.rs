@@ -44,6 +44,13 @@ fn loss_warning(balance: &PowerBalance) -> Option<String> {
     })
 }
 
+/// Says what was dropped because it was no number.
+fn invalid_warning(count: u64, what: &str) -> Option<String> {
+    (count > 0).then(|| {
+        format!("{count} {what} were dropped, since they were not finite: look for numbers without end in the scene")
+    })
+}
+
 fn balance_json(b: &PowerBalance) -> Value {
     json!({
         "emitted": b.emitted, "sky": b.sky, "absorbed": b.absorbed, "escaped": b.escaped, "lost": b.lost,

@@ -9,7 +9,7 @@ use twinray_scene::sample::PixelSample;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
-use crate::direct::{Shadows, direct, weights};
+use crate::direct::{Shadows, direct, is_straight, weights};
 use crate::lights::Lights;
 use crate::picture::first_side;
 use crate::reconstruct::Reconstruction;
@@ -86,6 +86,8 @@ pub(super) struct Gathered {
 #[derive(Clone, Copy)]
 struct Before<'s> {
     point: DVec3,
+    /// The direction in which it went on.
+    heading: DVec3,
     /// Density of the direction in which it went on.
     density: f64,
     /// Way since then.
@@ -165,7 +167,8 @@ impl<'a> Estimator<'a> {
         }
         let mut gathered =
             Gathered { direction, density, emitted: Rgb::BLACK, lamp: None, scattered: None, other: Rgb::BLACK };
-        let before = Before { point: point.vertex.point, density, distance: 0.0, lit: Some(shadows) };
+        let before =
+            Before { point: point.vertex.point, heading: direction, density, distance: 0.0, lit: Some(shadows) };
         self.follow(&point.vertex, before, direction, numbers, &mut gathered);
         Some(gathered)
     }
@@ -191,7 +194,7 @@ impl<'a> Estimator<'a> {
             numbers.jump(PAIRS * u64::from(MOST_MET + 2 + met));
             let Some(hit) = from.next(scene, beyond, direction) else {
                 if let Some(sky) = scene.environment() {
-                    let weight = self.weight(&before, |by| self.lights.sky_density_by(by.choice, direction));
+                    let weight = self.weight(&before, direction, |by| self.lights.sky_density_by(by.choice, direction));
                     let light = throughput * sky.radiance(direction) * weight;
                     if met == 0 {
                         gathered.lamp = self.lights.sky_lamp(direction);
@@ -212,7 +215,7 @@ impl<'a> Estimator<'a> {
             let emitted = scene.emission_at(hit.triangle, hit.side, hit.u, hit.v);
             if !emitted.is_black() {
                 let density = |by: Shadows| self.lights.density_by(by.choice, before.point, patch, vertex.point);
-                let light = throughput * emitted * self.weight(&before, density);
+                let light = throughput * emitted * self.weight(&before, direction, density);
                 if met == 0 {
                     gathered.lamp = self.lights.lamp_of(patch);
                 }
@@ -223,7 +226,7 @@ impl<'a> Estimator<'a> {
                 Step::End => break,
                 Step::On(way) => {
                     throughput = throughput * way.factor;
-                    before.lit = before.lit.filter(|_| way.straight);
+                    before.lit = before.lit.filter(|_| way.clear);
                     (direction, beyond, medium) = (way.direction, way.beyond, way.medium);
                 }
                 Step::Scatter(factor) => {
@@ -246,7 +249,7 @@ impl<'a> Estimator<'a> {
                     }
                     throughput = throughput * brdf.eval(next) * (cosine / density);
                     count += 1;
-                    before = Before { point: vertex.point, density, distance: 0.0, lit: Some(own) };
+                    before = Before { point: vertex.point, heading: next, density, distance: 0.0, lit: Some(own) };
                     (direction, beyond, medium) = (next, false, None);
                 }
             }
@@ -262,10 +265,12 @@ impl<'a> Estimator<'a> {
     }
 
     /// Weight of what a path met that a shadow ray could have found with density `light`.
-    fn weight(&self, before: &Before, light: impl Fn(Shadows) -> f64) -> f64 {
+    fn weight(&self, before: &Before, direction: DVec3, light: impl Fn(Shadows) -> f64) -> f64 {
         match before.lit {
-            Some(by) => weights(f64::from(by.candidates) * light(by), before.density)[1],
-            None => 1.0,
+            Some(by) if is_straight(before.heading, direction) => {
+                weights(f64::from(by.candidates) * light(by), before.density)[1]
+            }
+            _ => 1.0,
         }
     }
 

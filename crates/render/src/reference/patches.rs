@@ -117,6 +117,12 @@ fn arriving(tracer: &PathTracer, patch: PatchId, random: &mut Stream) -> Rgb {
     let point = scene.point_of(scene.triangle_of(patch), u, v);
     let white = Brdf::Lambertian { reflectance: Rgb::WHITE };
     let scatter = Scatter { brdf: white, specular: None };
-    tracer.follow(Vertex { patch, point, geometric: normal, normal, scatter, inside: false }, normal, random).reflected
+    tracer
+        .follow(
+            Vertex { patch, point, geometric: normal, normal, scatter, inside: false, is_clear: false },
+            normal,
+            random,
+        )
+        .reflected
         * PI
 }

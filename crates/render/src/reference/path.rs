@@ -11,6 +11,7 @@ use twinray_scene::brdf::attenuated;
 use twinray_scene::sample::Stream;
 use twinray_scene::{PatchScene, Rgb};
 
+use crate::direct::is_straight;
 use crate::lights::Lights;
 use crate::vertex::{Look, Step, Vertex};
 
@@ -71,8 +72,8 @@ impl<'a> PathTracer<'a> {
     pub fn follow(&self, mut vertex: Vertex, mut wo: DVec3, random: &mut Stream) -> Found {
         let scene = self.scene;
         let (mut found, mut throughput) = (Found::default(), Rgb::WHITE);
-        // The last point that scattered, and the density of the direction from there.
-        let mut scattered: Option<(DVec3, f64)> = None;
+        // The last point that scattered, the direction from there and its density.
+        let mut scattered: Option<(DVec3, DVec3, f64)> = None;
         // Whether a shadow ray from there may have found what is met next.
         let mut lit = false;
         let mut look = Look::Display;
@@ -82,7 +83,7 @@ impl<'a> PathTracer<'a> {
                     Step::End => break,
                     Step::On(way) => {
                         throughput = throughput * way.factor;
-                        lit &= way.straight;
+                        lit &= way.clear;
                         (way.direction, way.beyond, way.medium)
                     }
                     Step::Scatter(factor) => {
@@ -96,7 +97,7 @@ impl<'a> PathTracer<'a> {
                             break;
                         }
                         throughput = throughput * scatter.brdf.eval(*normal, wi, wo) * (cosine / density);
-                        (scattered, lit, look) = (Some((*point, density)), true, Look::Plain);
+                        (scattered, lit, look) = (Some((*point, wi, density)), true, Look::Plain);
                         (wi, false, None)
                     }
                 };
@@ -104,7 +105,9 @@ impl<'a> PathTracer<'a> {
                 break;
             }
             let weight = |light: &dyn Fn(DVec3) -> f64| match scattered {
-                Some((point, density)) if lit => self.technique.weights(light(point), density)[1],
+                Some((point, heading, density)) if lit && is_straight(heading, direction) => {
+                    self.technique.weights(light(point), density)[1]
+                }
                 // Whoever looks through shadow rays alone would miss what only paths find.
                 _ => 1.0,
             };

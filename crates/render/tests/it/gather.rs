@@ -83,7 +83,7 @@ fn in_the_hall() {
 
 #[test]
 fn with_mirrors_and_glass() {
-    for boxes in [Boxes::Mirror, Boxes::Coat, Boxes::Panes, Boxes::Glass] {
+    for boxes in [Boxes::Mirror, Boxes::Coat, Boxes::Panes, Boxes::Glass, Boxes::NearlyClear] {
         agrees(&cornell_with(boxes, false), 8000, [0.01, 0.03], 1600);
     }
 }

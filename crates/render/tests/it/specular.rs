@@ -1,12 +1,15 @@
 //! Mirrors and glass: the solver's rays against the path tracer's, and the light that neither may lose.
 
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3};
 use twinray_render::reference::{self, IrradianceOptions};
 use twinray_scene::brdf::Event;
 use twinray_scene::passing::End;
 use twinray_scene::sample::Stream;
-use twinray_scene::{Rgb, Scene, Surface, Texel, Transmission, Volume, builtin};
+use twinray_scene::{
+    Instance, LightKind, Material, Mesh, PunctualLight, Rgb, Scene, Surface, Texel, Transmission, Volume, builtin,
+};
 use twinray_solve::{Params, Solver};
+use twinray_testkit::ztest::Mean;
 
 use super::agreement::agrees;
 use super::reference::{cut, mean_over};
@@ -21,6 +24,8 @@ pub(crate) enum Boxes {
     Panes,
     /// Tinted bodies.
     Glass,
+    /// Tinted panes of roughness .05: clear to the solver alone.
+    NearlyClear,
 }
 
 /// The Cornell box with boxes of something else.
@@ -32,13 +37,13 @@ pub(crate) fn cornell_with(boxes: Boxes, closed: bool) -> Scene {
     let (metallic, base) = match boxes {
         Boxes::Mirror => (1.0, Rgb::grey(0.9)),
         Boxes::Coat => (0.0, Rgb::grey(0.7)),
-        Boxes::Panes => (0.0, tint),
+        Boxes::Panes | Boxes::NearlyClear => (0.0, tint),
         Boxes::Glass => (0.0, Rgb::WHITE),
     };
     material.surface = Surface::MetallicRoughness {
         base_color: Texel::constant(base),
         metallic,
-        roughness: 0.0,
+        roughness: if matches!(boxes, Boxes::NearlyClear) { 0.05 } else { 0.0 },
         metallic_roughness_texture: None,
         specular: 1.0,
         specular_texture: None,
@@ -47,8 +52,11 @@ pub(crate) fn cornell_with(boxes: Boxes, closed: bool) -> Scene {
         ior: 1.5,
     };
     let volume = matches!(boxes, Boxes::Glass).then_some(Volume { attenuation: Rgb::new(0.5, 1.0, 4.0) });
-    material.transmission =
-        matches!(boxes, Boxes::Panes | Boxes::Glass).then_some(Transmission { factor: 1.0, texture: None, volume });
+    material.transmission = matches!(boxes, Boxes::Panes | Boxes::Glass | Boxes::NearlyClear).then_some(Transmission {
+        factor: 1.0,
+        texture: None,
+        volume,
+    });
     scene
 }
 
@@ -141,4 +149,62 @@ fn the_sky_behind_glass_is_seen_from_the_air() {
         }
     }
     assert!(bent > 20, "only {bent} rays came through glass to the sky");
+}
+
+/// A floor under a large slab of glass, in the light of a far lamp 40° from above: (1 − F)/(1 + F) of it arrives, with
+/// Schlick's F, and paths, which do not follow it to and fro within the slab, find (1 − F)².
+#[test]
+fn slabs_of_glass_let_the_sun_in() {
+    let quad = |corners: [[f32; 3]; 4], material| Mesh {
+        positions: corners.to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        material,
+        ..Mesh::default()
+    };
+    let slab = |y: f32, up: bool| {
+        let (a, b) = (4.0, if up { -4.0 } else { 4.0 });
+        quad([[-a, y, b], [-a, y, -b], [a, y, -b], [a, y, b]], 1)
+    };
+    let floor = quad([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0]], 0);
+    let mut scene = cornell_with(Boxes::Glass, true);
+    let glass = scene.materials.iter().find(|m| m.name == "box").unwrap().clone();
+    let transmission = Transmission { factor: 1.0, texture: None, volume: Some(Volume { attenuation: Rgb::BLACK }) };
+    let black = Surface::Lambertian { reflectance: Texel::constant(Rgb::BLACK) };
+    scene.materials = vec![
+        Material { name: "floor".into(), surface: black, ..Material::default() },
+        Material { transmission: Some(transmission), ..glass },
+    ];
+    scene.meshes = vec![floor, slab(2.0, false), slab(2.1, true)];
+    let place = |mesh| Instance { name: String::new(), mesh, transform: DAffine3::IDENTITY };
+    scene.instances = (0..3).map(place).collect();
+    let towards = DVec3::new(40f64.to_radians().sin(), 40f64.to_radians().cos(), 0.0);
+    scene.lights = vec![PunctualLight {
+        name: "sun".into(),
+        kind: LightKind::Directional,
+        intensity: Rgb::grey(1000.0),
+        transform: DAffine3::from_quat(DQuat::from_rotation_arc(-DVec3::Z, -towards)),
+        profile: None,
+    }];
+    let scene = cut(&scene, 300);
+    // The slab's faces must face away from it.
+    let is_floor = |p| scene.material(p).name == "floor";
+    let f = 0.04 + 0.96 * (1.0 - towards.y).powi(5);
+    let arriving = 1000.0 * towards.y;
+
+    let solved: Vec<f64> = (0..4)
+        .map(|seed| {
+            let mut solver = Solver::new(&scene, Params::default_preset(seed), None).unwrap();
+            solver.run(400_000);
+            mean_over(&scene, &solver.solution().patch_light(&scene), is_floor).value
+        })
+        .collect();
+    let solved = Mean::of(&solved);
+    let expected = arriving * (1.0 - f) / (1.0 + f);
+    println!("solved {solved:?}, expected {expected:.2}; without glass {arriving:.2}");
+    // Few rays of so wide a slab meet the floor.
+    assert!((solved.value - expected).abs() < 5.0 * solved.error && solved.error < 0.02 * expected, "{solved:?}");
+    let options = IrradianceOptions { paths_per_patch: 4, ..IrradianceOptions::default() };
+    let traced = mean_over(&scene, &reference::irradiance(&scene, &options), is_floor).value;
+    let expected = arriving * (1.0 - f).powi(2);
+    assert!((traced / expected - 1.0).abs() < 1e-3, "{traced} against {expected}");
 }

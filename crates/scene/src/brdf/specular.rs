@@ -163,6 +163,18 @@ impl Specular {
         self.volume.is_none() && self.alpha == 0.0 && self.transmits()
     }
 
+    /// True if light passes sharply, bent or not.
+    pub fn is_clear(&self) -> bool {
+        self.alpha == 0.0 && self.transmits()
+    }
+
+    /// How much longer the bent way within a body is than the straight one would be between the same parallel faces, for
+    /// light of this cosine outside.
+    pub fn stretch(&self, cosine: f64) -> f64 {
+        let inside = (1.0 - (1.0 - cosine * cosine) / (self.ior * self.ior)).max(0.0).sqrt();
+        cosine / inside
+    }
+
     /// True if any light passes beyond the surface.
     pub fn transmits(&self) -> bool {
         !self.transmittance.is_black()

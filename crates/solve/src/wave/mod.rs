@@ -311,10 +311,17 @@ impl WaveContext<'_> {
                 true => (d.on_hit, d.on_shooter),
                 false => (d.on_hit * factor, d.on_shooter * factor),
             };
+            // What goes on at a pane is counted where it ends.
+            let stays = |end: u32, wi: DVec3, power: Rgb| match Shot::patch(end) {
+                Some(patch) if !passages.is_empty() => power * (Rgb::WHITE - self.scene.passed_share(patch, wi)),
+                _ => power,
+            };
             if shot.far == SKY {
-                (tally.sky, tally.escaped) = (tally.sky + on_shooter, tally.escaped + on_far);
+                tally.sky += stays(shot.shooter, shot.direction, on_shooter);
+                tally.escaped += on_far;
             } else if is_distant(shot.shooter) {
-                (tally.sky, tally.escaped) = (tally.sky + on_far, tally.escaped + on_shooter);
+                tally.sky += stays(shot.far, -arrived, on_far);
+                tally.escaped += on_shooter;
             }
             let ends = [
                 (shot.far, on_far, shot.shooter, &here, -arrived),
