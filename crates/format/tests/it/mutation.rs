@@ -21,7 +21,8 @@ fn good_glb() -> Vec<u8> {
 
 const OBJ: &str = "mtllib a.mtl\no box\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5\nvt 0 0\nvt 1 1\nvn 0 0 1\n\
     usemtl a\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng more\nusemtl b\nf -4 -3 -2\nl 1 2\ns off\n";
-const MTL: &str = "newmtl a\nKd 0.5 0.5 0.5\nKs 0.5 0.5 0.5\nNs 10\nmap_Kd -o 1 1 t.png\nnewmtl b\nKe 1 1 1\nd 0.5\n";
+const MTL: &str = "newmtl a\nKd 0.5 0.5 0.5\nKs 0.5 0.5 0.5\nNs 10\nmap_Kd -o 1 1 t.png\nnewmtl b\nKe 1 1 1\nd 0.5\nmap_d t.png\nnorm -bm 2 t.png\n\
+    newmtl c\nillum 7\nNi 1.5\nTf 1 0.5 1\nNs 30\n";
 
 /// What random bytes rarely hit upon.
 const WORDS: [&str; 24] = [
