@@ -114,7 +114,6 @@ fn everything() -> Scene {
         environment: Some(Environment::Uniform(Rgb::new(1.0, 2.0, 3.5))),
         lights: Vec::new(),
         suggested_patches: Some(1234),
-        ..Scene::default()
     }
 }
 
