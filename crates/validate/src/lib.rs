@@ -52,7 +52,7 @@ fn cie(effort: Effort) -> Section {
             "Validated against the analytic families of CIE 171:2006, *Test Cases to Assess the Accuracy of Lighting Computer \
              Programs*. Each case below is of the named family: its kind of scene with dimensions and sensors of our own, and an \
              expectation derived in the code and held against independent quadrature. The tables of the report are not reproduced, \
-             and nothing here is a certificate.\n\nNot applicable yet:\n\n{}",
+             and nothing here is a certificate.\n\nNot covered yet:\n\n{}",
             missing.join("\n")
         ),
         cases: cie::cases(effort),
