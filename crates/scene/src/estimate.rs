@@ -155,6 +155,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::authored::{NormalMap, TextureImage, TextureRef};
     use crate::builtin;
     use crate::patch::{PatchBudget, PatchScene};
 
@@ -178,6 +179,48 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Attributes that few scenes need cost what they take, and nothing where no material asks for them.
+    #[test]
+    fn rare_attributes_are_counted() {
+        let options = PatchOptions { budget: PatchBudget::Count(1), two_sided: false };
+        let bytes = |scene: &Scene| {
+            let [kernel, constants] = PatchScene::new(scene, options).unwrap().bytes();
+            (estimate(scene, options).unwrap().bytes as i64, (kernel + constants) as i64)
+        };
+        let mut scene = builtin::cornell(false);
+        scene.images.push(std::sync::Arc::new(TextureImage {
+            name: "t".into(),
+            width: 1,
+            height: 1,
+            rgba: vec![255; 4],
+        }));
+        let plain = bytes(&scene);
+        for mesh in &mut scene.meshes {
+            mesh.second_texcoords = Some(vec![[0.0; 2]; mesh.positions.len()]);
+            mesh.tangents = Some(vec![[1.0, 0.0, 0.0, 1.0]; mesh.positions.len()]);
+        }
+        assert_eq!(bytes(&scene), plain);
+        let texture = TextureRef { set: 1, ..TextureRef::of(0) };
+        scene.materials[0].normal_map = Some(NormalMap { texture: texture.clone(), scale: 1.0 });
+        let rich = bytes(&scene);
+        assert!(rich.1 > plain.1);
+        assert_eq!(rich.0 - plain.0, rich.1 - plain.1);
+        scene.materials[0].surface = Surface::MetallicRoughness {
+            base_color: Texel::constant(Rgb::grey(0.5)),
+            metallic: 0.0,
+            roughness: 0.5,
+            metallic_roughness_texture: None,
+            specular: 1.0,
+            specular_texture: Some(texture),
+            specular_color: Rgb::WHITE,
+            specular_color_texture: None,
+            ior: 1.5,
+        };
+        let glossy = bytes(&scene);
+        assert_eq!(glossy.1 - rich.1, 16 * estimate(&scene, options).unwrap().triangles as i64);
+        assert_eq!(glossy.0 - rich.0, glossy.1 - rich.1);
     }
 
     #[test]

@@ -3,8 +3,10 @@
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use twinray_format::{FormatError, Limits, Reading, read_scene};
-use twinray_scene::{Material, Rgb, Scene, Surface, Texel, Volume};
+use twinray_scene::{Material, PatchBudget, PatchOptions, PatchScene, Rgb, Scene, Surface, Texel, Volume};
 
 use crate::support::{normal, warnings, world_triangles};
 
@@ -183,6 +185,35 @@ fn khronos_materials_are_read() {
     assert_eq!((transform.offset, transform.scale), ([-0.8635583765172254, 1.125025697811076], [3.0, 3.0]));
     assert_eq!(transform.rotation, 0.0872664675116539);
     assert_eq!(warnings(&reading).matches("KHR_materials_sheen").count(), 1);
+}
+
+/// Half of this sample's tiles are modelled spheres, the others flat with their normal map, under turned and mirrored
+/// coordinates: both halves must show the same normals.
+#[test]
+fn mapped_normals_are_those_of_the_modelled_shape() {
+    let Some(root) = shared_scenes() else { return };
+    let scene = read_file(&root.join("khronos/NormalTangentTest.glb")).unwrap().scene;
+    let options = PatchOptions { budget: PatchBudget::Size(f64::INFINITY), two_sided: false };
+    let scene = PatchScene::new(&scene, options).unwrap();
+    let normal = |x: f64, y: f64| {
+        let hit = scene.trace(DVec3::new(x, y, 3.0) - scene.centre(), DVec3::NEG_Z)?;
+        Some(scene.normal_at(&hit, 0.0))
+    };
+    // Three columns of pairs, 0.8 apart; the second tile of a pair is 0.32 to the right of the first.
+    let (mut sum, mut tilted) = (0.0, 0);
+    for column in [-1.11, -0.31, 0.49] {
+        for (i, j) in (0..30).flat_map(|i| (0..200).map(move |j| (i, j))) {
+            let [x, y] = [column + 0.3 * (f64::from(i) + 0.5) / 30.0, 1.1 - 2.0 * (f64::from(j) + 0.5) / 200.0];
+            let (Some(shape), Some(map)) = (normal(x, y), normal(x + 0.32, y)) else { continue };
+            if shape.z < 0.95 {
+                sum += shape.dot(map);
+                tilted += 1;
+            }
+        }
+    }
+    println!("{tilted} places, mean cosine {}", sum / f64::from(tilted));
+    // Places that are a hundredth off are turned by a tenth on such spheres; a wrong axis turns most by a half or more.
+    assert!(tilted > 1000 && sum / f64::from(tilted) > 0.98, "{tilted}: {}", sum / f64::from(tilted));
 }
 
 fn base(material: &Material) -> &Texel {
