@@ -67,11 +67,11 @@ pub fn document(sections: &[Section], commit: &str) -> String {
 const PICTURES: &str = "
 ## Pictures beside another renderer's
 
-Three real interiors come with pictures by Tungsten, a path tracer. They stand beside ours in [gallery.md](gallery.md), with what \
-differs: in the modern hall the wood of the steps, a lacquer there and a dielectric in glTF, is brighter and redder here; in \
-Veach's room behind the door two teapots and the checkerboard are missing from the files; in the grey and white room sofa and \
-panelling are approximations. Geometry, shadows, reflections and the balance of light are the same. How far pictures are from those \
-of our own path tracer, which takes the very same materials, is measured: [performance.md](performance.md#pictures).
+Three real interiors come with pictures by Tungsten, a path tracer. They stand beside ours in [gallery.md](gallery.md), judged by eye, with \
+what differs: the wood of the modern hall is brighter and redder here; in Veach's room behind the door teapots and checkerboard are \
+missing from the file; the grey and white room is still noisy here. The files' materials are approximations of the originals, and how \
+much of a difference is theirs has not been measured. How far pictures are from those of our own path tracer, which takes the very same \
+materials, is: [performance.md](performance.md#pictures).
 ";
 
 /// One section.

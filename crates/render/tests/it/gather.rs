@@ -35,14 +35,14 @@ fn blocks(picture: &Picture, variance: &[f32], edge: usize) -> Vec<(f64, f64)> {
 
 /// Compares a gather with paths: the picture's mean may be off by `bias` at most beside the noise of both, and no block
 /// of pixels by more than `local`.
-fn agrees(authored: &Scene, patches: usize, [bias, local]: [f64; 2], paths: u32) {
+fn agrees(authored: &Scene, patches: usize, [bias, local]: [f64; 2], samples: f64, paths: u32) {
     let scene = cut(authored, patches);
     let solution = solved(&scene, 150 * scene.len() as u64);
     let (camera, width, height) = (&authored.cameras[0], 64, 64);
     let mut gather =
         Gather::new(&scene, &solution, camera, &GatherOptions { width, height, ..GatherOptions::default() });
     gather.advance_to(8.0);
-    gather.advance_to(64.0);
+    gather.advance_to(samples);
     let options = PathPictureOptions { width, height, samples: paths, seed: 5, ..PathPictureOptions::default() };
     let (traced, variance) = reference::picture(&scene, camera, &options);
     let gathered = blocks(&gather.picture(), &gather.variance(), 16);
@@ -67,24 +67,26 @@ fn agrees(authored: &Scene, patches: usize, [bias, local]: [f64; 2], paths: u32)
     let off = sums[0] / sums[1] - 1.0;
     println!("{}: mean off by {:+.3} %, noise allows {:.3} %", authored.name, 100.0 * off, 100.0 * error);
     assert!(off.abs() < bias + error, "{}: the mean is off by {off}", authored.name);
-    assert!(error < 0.04, "{}: too noisy to tell anything", authored.name);
+    assert!(error < 0.03, "{}: too noisy to tell anything", authored.name);
 }
 
 #[test]
 fn in_the_cornell_box() {
-    agrees(&builtin::cornell(false), 8000, [0.01, 0.02], 600);
+    agrees(&builtin::cornell(false), 8000, [0.01, 0.02], 64.0, 600);
 }
 
 /// Far ends whose lobes are followed, and lamps seen in a floor.
 #[test]
 fn in_the_hall() {
-    agrees(&builtin::hall(), 20_000, [0.01, 0.04], 600);
+    agrees(&builtin::hall(), 20_000, [0.01, 0.04], 64.0, 600);
 }
 
 #[test]
 fn with_mirrors_and_glass() {
     for boxes in [Boxes::Mirror, Boxes::Coat, Boxes::Panes, Boxes::Glass, Boxes::NearlyClear] {
-        agrees(&cornell_with(boxes, false), 8000, [0.01, 0.03], 1600);
+        // What a mirror throws is found by chance alone: it takes many rays of both to know it.
+        let (samples, paths) = if matches!(boxes, Boxes::Mirror) { (256.0, 2000) } else { (64.0, 1000) };
+        agrees(&cornell_with(boxes, false), 8000, [0.01, 0.03], samples, paths);
     }
 }
 

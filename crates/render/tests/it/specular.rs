@@ -91,7 +91,7 @@ fn energy_is_kept() {
             solver.run(400_000);
             let balance = solver.solution().balance();
             println!("{boxes:?}: {balance:?}, residual {:+.4}", balance.residual());
-            assert!(balance.residual().abs() < 0.02, "{boxes:?}: {balance:?}");
+            assert!(balance.residual().abs() < 0.01, "{boxes:?}: {balance:?}");
         }
     }
 }
