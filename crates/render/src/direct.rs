@@ -38,12 +38,13 @@ pub(crate) fn weights(shadow_ray: f64, brdf: f64) -> [f64; 2] {
 }
 
 /// One sample of the radiance that `brdf` reflects at `vertex` of light straight from what emits, and the lamp that it
-/// comes from. `numbers` gives pairs of uniform numbers, two for each candidate and one more.
+/// comes from. `own` is the density per solid angle of the caller's own ray. `numbers` gives pairs of uniform numbers, two for each candidate and one more.
 pub(crate) fn direct(
     scene: &PatchScene,
     lights: &Lights,
     vertex: &Vertex,
     brdf: &Towards,
+    own: impl Fn(DVec3) -> f64,
     shadows: Shadows,
     mut numbers: impl FnMut() -> [f64; 2],
 ) -> (Rgb, Option<usize>) {
@@ -58,7 +59,7 @@ pub(crate) fn direct(
         if cosine <= 0.0 || geometric.dot(light.towards) <= 0.0 {
             continue;
         }
-        let (a, b) = (f64::from(candidates) * light.density, brdf.pdf(light.towards));
+        let (a, b) = (f64::from(candidates) * light.density, own(light.towards));
         let density = a / weights(a, b)[0];
         let gives = light.radiance * brdf.eval(light.towards) * (cosine / density);
         let luminance = gives.luminance();

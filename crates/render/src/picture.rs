@@ -235,8 +235,8 @@ impl View<'_> {
                         let mut random = Stream::new(0, 0x1A39, u.index);
                         let numbers = || [random.uniform(), random.uniform()];
                         let shadows = Shadows { choice: lamps.by_power(), candidates: LAMPS };
-                        met + direct(self.scene, lamps, vertex, &brdf.lobe_towards(vertex.normal, wo), shadows, numbers)
-                            .0
+                        let lobe = brdf.lobe_towards(vertex.normal, wo);
+                        met + direct(self.scene, lamps, vertex, &lobe, |d| lobe.pdf(d), shadows, numbers).0
                     }
                 };
                 direct + traced * (limit / traced.luminance().max(1e-300)).min(1.0)

@@ -22,6 +22,12 @@ pub(crate) struct Seen {
     pub covered: u32,
     /// The part that surfaces reflect of light straight from emitters and sky.
     pub direct: Rgb,
+    /// What was too much for one pixel, of direct and of indirect light: it is for all around, and no part of the sums above.
+    pub excess: [Rgb; 2],
+    /// Σ of the squares of its luminance, ray by ray.
+    pub excess_squares: f64,
+    /// What was expected of gather rays.
+    pub expected: Rgb,
     /// Rays that met surfaces without emission, and the luminance of these.
     pub unlit: u32,
     pub unlit_luminance: f64,
@@ -48,6 +54,9 @@ impl PixelSums {
         s.lights += batch.lights;
         s.covered += batch.covered;
         s.direct += batch.direct;
+        (0..2).for_each(|k| s.excess[k] += batch.excess[k]);
+        s.excess_squares += batch.excess_squares;
+        s.expected += batch.expected;
         s.unlit += batch.unlit;
         s.unlit_luminance += batch.unlit_luminance;
         s.empty += batch.empty;
@@ -76,6 +85,29 @@ impl PixelSums {
     /// Mean of the part that is emitted where it is seen.
     pub fn lights(&self) -> Rgb {
         self.seen.lights / f64::from(self.seen.rays.max(1))
+    }
+
+    /// Mean of what was too much for this pixel and is for all around: of direct and of indirect light.
+    pub fn excess(&self) -> [Rgb; 2] {
+        self.seen.excess.map(|light| light / f64::from(self.seen.rays.max(1)))
+    }
+
+    /// Sum and sum of squares of the luminance of what was too much, ray by ray.
+    pub fn excess_moments(&self) -> [f64; 2] {
+        [(self.seen.excess[0] + self.seen.excess[1]).luminance(), self.seen.excess_squares]
+    }
+
+    /// Mean of what was expected of gather rays.
+    pub fn expected(&self) -> Rgb {
+        self.seen.expected / f64::from(self.seen.rays.max(1))
+    }
+
+    /// Gives the pixel its share of what was too much for others: mean direct and indirect light.
+    pub fn give(&mut self, [direct, indirect]: [Rgb; 2]) {
+        let rays = f64::from(self.seen.rays);
+        self.seen.direct += direct * rays;
+        self.seen.radiance += (direct + indirect) * rays;
+        self.seen.unlit_luminance += (direct + indirect).luminance() * f64::from(self.seen.unlit);
     }
 
     /// True if no ray met a light.

@@ -6,11 +6,13 @@
 //! patches to look even, its end is a point like the first. No patch is seen directly: shadows and textures are sharp,
 //! and only light of two bounces and more is as smooth as patches are.
 //! `sample` follows one camera ray; `tile` lets neighbours share what their gather rays find; `places` learn which lamps
-//! light them; `pass` decides how many rays each place gets.
+//! light them, and with `guide` from where light comes; `spread` gives to many what was too much for one; `pass` decides how many rays each place gets.
 
+mod guide;
 mod pass;
 mod places;
 mod sample;
+mod spread;
 mod tile;
 
 use twinray_scene::{Camera, PatchScene};
@@ -83,17 +85,17 @@ impl<'a> Gather<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        sums::picture(&self.pixels, self.film.window.width)
+        sums::picture(&self.given(), self.film.window.width)
     }
 
     /// The part of every pixel that is emitted where it is seen, or reflected straight from what emits; linear radiance.
     pub fn direct(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| (p.lights() + p.direct()).to_f32()).collect()
+        self.given().iter().map(|p| (p.lights() + p.direct()).to_f32()).collect()
     }
 
     /// All other light of every pixel, linear radiance.
     pub fn indirect(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
+        self.given().iter().map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
@@ -105,12 +107,20 @@ impl<'a> Gather<'a> {
     /// Relative RMS error of the pixels' luminance by their noise, √(Σ variance / Σ 𝓛²), over pixels that no light
     /// covers; over all pixels if there are no others. Infinite before the second batch; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
-        sums::relative_error(&self.pixels)
+        sums::relative_error(&self.given())
     }
 
     /// Camera rays that were dropped because their radiance was not finite; 0 unless something is wrong.
     pub fn invalid(&self) -> u64 {
         self.pixels.iter().map(|p| u64::from(p.invalid())).sum()
+    }
+
+    /// Sums of the pixels with their shares of what is for many.
+    fn given(&self) -> Vec<PixelSums> {
+        let mut pixels = self.pixels.clone();
+        let shares = spread::spread(&pixels, self.film.window.width as usize);
+        pixels.iter_mut().zip(shares).for_each(|(pixel, share)| pixel.give(share));
+        pixels
     }
 
     /// Sums of a pixel of the window.

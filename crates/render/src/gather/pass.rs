@@ -11,8 +11,8 @@ use twinray_scene::sample::PixelSample;
 use twinray_scene::sample::stream::mix;
 
 use super::Gather;
-use super::places::{EDGE, Lessons};
-use super::tile::{PIXELS, SIDE, Tile, TilePixel};
+use super::places::{EDGE, Lesson, Lessons};
+use super::tile::{Known, PIXELS, SIDE, Tile, TilePixel};
 use crate::film::tent;
 use crate::sums::{PixelSums, Seen};
 
@@ -38,7 +38,7 @@ const OFFSETS: [usize; SIDE] = [0, 2, 1, 3];
 
 /// What is known of a place.
 #[derive(Clone, Copy, Debug, Default)]
-struct Known {
+struct Noise {
     pixels: f64,
     luminance: f64,
     /// Variance of a batch's mean.
@@ -97,7 +97,7 @@ impl Gather<'_> {
     /// Batches for every place, about `budget` batches of pixels in all.
     fn plan(&self, budget: f64) -> Vec<u32> {
         let (columns, rows) = self.places.size();
-        let known: Vec<Known> = (0..columns * rows).into_par_iter().map(|place| self.known(place)).collect();
+        let known: Vec<Noise> = (0..columns * rows).into_par_iter().map(|place| self.known(place)).collect();
         let total_pixels: f64 = known.iter().map(|k| k.pixels).sum();
         let mean = known.iter().map(|k| k.pixels * k.luminance).sum::<f64>() / total_pixels.max(1.0);
         let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
@@ -150,9 +150,9 @@ impl Gather<'_> {
     }
 
     /// What is known of a place.
-    fn known(&self, place: usize) -> Known {
+    fn known(&self, place: usize) -> Noise {
         let [columns, rows] = self.places.pixels(place);
-        let mut known = Known::default();
+        let mut known = Noise::default();
         for p in rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| self.sums_of(x, y)) {
             known.pixels += 1.0;
             known.luminance += p.radiance().luminance();
@@ -226,16 +226,29 @@ impl Gather<'_> {
             let tile = Tile { pixels: &pixels, seed: self.seed };
             let mut seen = [Seen::default(); PIXELS];
             let sums_of = |p: &TilePixel| (p.y - rows.start) * width + p.x;
+            let sums_before = &*sums;
             let before: Vec<u32> = pixels.iter().map(|p| sums[sums_of(p)].rays()).collect();
             let ray = |p: &TilePixel, numbers: &mut PixelSample| {
                 let (offset, lens) = (numbers.pair().map(tent), numbers.pair());
                 let at = [window.x + p.x as u32, window.y + p.y as u32];
                 self.film.ray(&self.camera, at, offset, lens)
             };
-            let shadows = |p: &TilePixel| self.places.shadows(first_place + p.place, by_power);
+            let known = |p: &TilePixel| {
+                let place = first_place + p.place;
+                let sums = &sums_before[sums_of(p)];
+                Known {
+                    shadows: self.places.shadows(place, by_power),
+                    guide: self.places.guide(place),
+                    usual: self.places.usual(place),
+                    least_usual: {
+                        let [direct, indirect] = sums.excess();
+                        (sums.radiance() + direct + indirect - sums.lights()).luminance()
+                    },
+                }
+            };
             for k in 0..BATCH {
-                let learn = |p: &TilePixel, lamp: usize, light: f64| lessons.add(p.place, lamp, light);
-                tile.sample(&self.estimator, &before, k, shadows, ray, &mut seen, learn);
+                let learn = |p: &TilePixel, lesson: Lesson| lessons.add(p.place, lesson);
+                tile.sample(&self.estimator, &before, k, known, ray, &mut seen, learn);
             }
             for (p, seen) in pixels.iter().zip(&seen) {
                 sums[sums_of(p)].add(seen);

@@ -1,10 +1,13 @@
-//! What is known of places of the film: which lamps light them, and how noisy they are.
+//! What is known of places of the film: which lamps light them, from where light comes, and how noisy they are.
 //!
 //! A place is a square of pixels. Which lamps light it, and how much of them gets there, is learnt from the shadow rays
-//! themselves, pass by pass; a pass looks at what earlier ones learnt, so that threads change nothing.
+//! themselves, directions from gather rays, pass by pass; a pass looks at what earlier ones learnt, so that threads change nothing.
 
 use std::ops::Range;
 
+use glam::DVec3;
+
+use super::guide::{self, CELLS, Guide};
 use crate::direct::Shadows;
 use crate::film::Crop;
 use crate::lights::{Choice, Lights};
@@ -25,6 +28,7 @@ pub(super) struct Places {
     /// Per place and lamp: Σ of the light that it gave; per place, the number of shadow rays.
     lessons: Lessons,
     choices: Vec<Option<Choice>>,
+    guides: Vec<Option<Guide>>,
 }
 
 /// What shadow rays taught of some places.
@@ -32,6 +36,23 @@ pub(super) struct Places {
 pub(super) struct Lessons {
     given: Vec<f64>,
     rays: Vec<u64>,
+    /// Per place and cell of directions: Σ of the square of the light that gather rays into it brought, over their
+    /// density; per place, the number of gather rays.
+    squares: Vec<f64>,
+    gathered: Vec<u64>,
+    /// Per place: Σ of what was reflected, and of what was expected.
+    reflected: Vec<[f64; 2]>,
+}
+
+/// What a ray taught.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Lesson {
+    /// A shadow ray brought so much light of a lamp.
+    Lamp(usize, f64),
+    /// A camera ray's point reflected so much, where so much was expected; luminance.
+    Reflected(f64, f64),
+    /// A gather ray in this direction brought light whose square over its density is this.
+    Direction(DVec3, f64),
 }
 
 impl Places {
@@ -39,7 +60,15 @@ impl Places {
         let count = |pixels: u32| (pixels as usize).div_ceil(EDGE);
         let (columns, rows, lamps) = (count(window.width), count(window.height), lights.len());
         let lessons = Lessons::new(columns * rows, lamps);
-        Self { window, columns, rows, lamps, lessons, choices: vec![None; columns * rows] }
+        Self {
+            window,
+            columns,
+            rows,
+            lamps,
+            lessons,
+            choices: vec![None; columns * rows],
+            guides: vec![None; columns * rows],
+        }
     }
 
     /// Columns and rows of places.
@@ -63,6 +92,17 @@ impl Places {
         self.choices[place].as_ref().map_or(otherwise, |choice| Shadows { choice, candidates: 1 })
     }
 
+    /// What was reflected over what was expected, at least 1.
+    pub fn usual(&self, place: usize) -> f64 {
+        let [brought, expected] = self.lessons.reflected[place];
+        if expected > 0.0 { (brought / expected).max(1.0) } else { 1.0 }
+    }
+
+    /// Whence light comes to a place, if that is known.
+    pub fn guide(&self, place: usize) -> Option<&Guide> {
+        self.guides[place].as_ref()
+    }
+
     /// Nothing learnt yet of the places in so many rows.
     pub fn lessons_of(&self, rows: Range<usize>) -> Lessons {
         Lessons::new(self.columns * rows.len(), self.lamps)
@@ -74,10 +114,21 @@ impl Places {
         let given = self.lessons.given[first * self.lamps..].iter_mut();
         given.zip(&lessons.given).for_each(|(sum, more)| *sum += more);
         self.lessons.rays[first..].iter_mut().zip(&lessons.rays).for_each(|(sum, more)| *sum += more);
+        let squares = self.lessons.squares[first * CELLS..].iter_mut();
+        squares.zip(&lessons.squares).for_each(|(sum, more)| *sum += more);
+        for (sum, more) in self.lessons.reflected[first..].iter_mut().zip(&lessons.reflected) {
+            (0..2).for_each(|k| sum[k] += more[k]);
+        }
+        self.lessons.gathered[first..].iter_mut().zip(&lessons.gathered).for_each(|(sum, more)| *sum += more);
     }
 
     /// Makes choices of what was learnt.
     pub fn conclude(&mut self, lights: &Lights) {
+        for (place, guide) in self.guides.iter_mut().enumerate() {
+            if self.lessons.gathered[place] >= LESSONS {
+                *guide = Guide::learnt(&self.lessons.squares[place * CELLS..(place + 1) * CELLS]);
+            }
+        }
         let power = lights.by_power();
         for (place, choice) in self.choices.iter_mut().enumerate() {
             let given = &self.lessons.given[place * self.lamps..(place + 1) * self.lamps];
@@ -96,13 +147,31 @@ impl Places {
 
 impl Lessons {
     fn new(places: usize, lamps: usize) -> Self {
-        Self { given: vec![0.0; places * lamps], rays: vec![0; places] }
+        Self {
+            given: vec![0.0; places * lamps],
+            rays: vec![0; places],
+            squares: vec![0.0; places * CELLS],
+            gathered: vec![0; places],
+            reflected: vec![[0.0; 2]; places],
+        }
     }
 
-    /// A shadow ray of a place brought so much light of a lamp.
-    pub fn add(&mut self, place: usize, lamp: usize, light: f64) {
-        let lamps = self.given.len() / self.rays.len();
-        self.given[place * lamps + lamp] += light;
-        self.rays[place] += 1;
+    /// Adds what a ray of a place taught.
+    pub fn add(&mut self, place: usize, lesson: Lesson) {
+        match lesson {
+            Lesson::Lamp(lamp, light) => {
+                let lamps = self.given.len() / self.rays.len();
+                self.given[place * lamps + lamp] += light;
+                self.rays[place] += 1;
+            }
+            Lesson::Reflected(brought, expected) => {
+                self.reflected[place][0] += brought;
+                self.reflected[place][1] += expected;
+            }
+            Lesson::Direction(direction, square) => {
+                self.squares[place * CELLS + guide::cell_of(direction)] += square;
+                self.gathered[place] += 1;
+            }
+        }
     }
 }

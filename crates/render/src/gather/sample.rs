@@ -9,6 +9,7 @@ use twinray_scene::sample::PixelSample;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
+use super::guide::{Aim, Guide};
 use crate::direct::{Shadows, direct, is_straight, weights};
 use crate::lights::Lights;
 use crate::picture::first_side;
@@ -25,9 +26,6 @@ const MOST_MET: u32 = 32;
 const NARROW: f64 = 3.0;
 /// Pairs of numbers that each met surface may draw.
 const PAIRS: u64 = 64;
-/// So many times what is expected of all gather rays of a point, one may bring: a path that found a lamp by way of a
-/// mirror or of a narrow lobe would be a bright dot, or a square where pixels share it.
-const FIREFLY: f64 = 32.0;
 /// Of the mean irradiance, what is expected everywhere.
 const DIM: f64 = 0.05;
 /// The least probability with which a lobe behind the gather ray is followed.
@@ -45,25 +43,25 @@ pub(super) struct Estimator<'a> {
 
 /// What a camera ray found.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sight {
+pub(super) struct Sight<'g> {
     /// Light that was seen: in mirrors and through glass too.
     pub lights: Rgb,
     /// The first point that scatters.
-    pub point: Option<Point>,
+    pub point: Option<Point<'g>>,
     /// Nothing was met.
     pub empty: bool,
 }
 
 /// A point that scatters towards the eye.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct Point<'g> {
     pub vertex: Vertex,
-    /// The BRDF as the eye sees it.
-    pub brdf: Towards,
+    /// The BRDF as the eye sees it, and where light is known to come from.
+    pub aim: Aim<'g>,
     /// Of the way to the eye.
     pub throughput: Rgb,
-    /// The most luminance that one gather ray may bring to the eye: many times what the solution expects of all.
-    pub limit: f64,
+    /// What the solution expects of all gather rays together, about: by the irradiance there, and not nothing in the dark.
+    pub expected: Rgb,
 }
 
 /// What the gather ray of a point found.
@@ -109,7 +107,13 @@ impl<'a> Estimator<'a> {
     }
 
     /// Follows a camera ray of the world through mirrors and glass.
-    pub fn look(&self, origin: DVec3, direction: DVec3, numbers: &mut PixelSample) -> Sight {
+    pub fn look<'g>(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        guide: Option<&'g Guide>,
+        numbers: &mut PixelSample,
+    ) -> Sight<'g> {
         let scene = self.scene;
         let mut sight = Sight::default();
         let sky = |towards| scene.environment().map_or(Rgb::BLACK, |e| e.radiance(towards));
@@ -132,9 +136,8 @@ impl<'a> Estimator<'a> {
                     let brdf = vertex.scatter.brdf.towards(vertex.normal, wo);
                     let throughput = throughput * factor;
                     let expected = self.solution.irradiance(patch).luminance().max(DIM * self.mean_irradiance) / PI;
-                    let albedo = (throughput * vertex.scatter.brdf.albedo(vertex.normal.dot(wo).max(0.0))).luminance();
-                    let limit = FIREFLY * expected * albedo;
-                    sight.point = Some(Point { vertex, brdf, throughput, limit });
+                    let expected = throughput * vertex.scatter.brdf.albedo(vertex.normal.dot(wo).max(0.0)) * expected;
+                    sight.point = Some(Point { vertex, aim: Aim { brdf, guide }, throughput, expected });
                     break;
                 }
                 Step::On(way) => way,
@@ -153,15 +156,17 @@ impl<'a> Estimator<'a> {
     /// Light straight from what emits that a point reflects to the eye, and the lamp that it comes from.
     pub fn lit(&self, point: &Point, shadows: Shadows, numbers: &mut PixelSample) -> (Rgb, Option<usize>) {
         numbers.jump(PAIRS * u64::from(MOST_MET + 1));
-        let (light, lamp) = direct(self.scene, &self.lights, &point.vertex, &point.brdf, shadows, || numbers.pair());
-        (point.throughput * light, lamp)
+        let Point { vertex, aim, throughput, .. } = point;
+        let own = |towards| aim.pdf(towards);
+        let (light, lamp) = direct(self.scene, &self.lights, vertex, &aim.brdf, own, shadows, || numbers.pair());
+        (*throughput * light, lamp)
     }
 
     /// Traces the gather ray of a point; `u` chooses its direction. `None` where the BRDF's choice is below the surface.
     pub fn gather(&self, point: &Point, u: [f64; 2], shadows: Shadows, numbers: &mut PixelSample) -> Option<Gathered> {
         let Vertex { geometric, normal, .. } = &point.vertex;
-        let direction = point.brdf.sample(u)?;
-        let density = point.brdf.pdf(direction);
+        let direction = point.aim.sample(u)?;
+        let density = point.aim.pdf(direction);
         if !(normal.dot(direction) > 0.0 && density > 0.0 && geometric.dot(direction) > 0.0) {
             return None;
         }
@@ -239,7 +244,8 @@ impl<'a> Estimator<'a> {
                     let Some((brdf, factor)) = read.traced else { break };
                     throughput *= factor;
                     let u = numbers.pair();
-                    let (light, _) = direct(scene, &self.lights, &vertex, &brdf, own, || numbers.pair());
+                    let (light, _) =
+                        direct(scene, &self.lights, &vertex, &brdf, |d| brdf.pdf(d), own, || numbers.pair());
                     radiance += throughput * light;
                     let Vertex { geometric, normal, .. } = &vertex;
                     let Some(next) = brdf.sample(u) else { break };

@@ -11,6 +11,8 @@ use twinray_scene::Rgb;
 use twinray_scene::sample::stream::mix;
 use twinray_scene::sample::{PixelSample, net_point};
 
+use super::guide::Guide;
+use super::places::Lesson;
 use super::sample::{Estimator, Gathered, Point, Sight};
 use crate::direct::Shadows;
 use crate::sums::Seen;
@@ -23,8 +25,15 @@ pub(super) const PIXELS: usize = SIDE * SIDE;
 const MOST_SQUARES: u64 = 1 << 32;
 /// Far ends count as far from so many times the distance between the points that share them.
 const FAR: f64 = 4.0;
-/// Lamps in mirrors and behind glass may bring so many times more than other far ends: they are the caustics.
-const CAUSTIC: f64 = 8.0;
+/// So many times what is usual at a pixel, a gather ray may bring to it at least; what is beyond is for all around.
+const BRIGHT: f64 = 4.0;
+/// As the pixel's rays become more, each may bring this part of what is usual for all of them: none ever shows as a dot, and
+/// in the limit nothing is given away.
+const BRIGHT_SHARE: f64 = 1.0 / 16.0;
+/// Light straight from what emits may be so many times more: most shadow rays bring nothing in half shadow, and others much.
+const BRIGHTER: f64 = 4.0;
+/// So many times what is expected of all gather rays of a point, one may bring to all pixels together. What is beyond is lost.
+const MOST: f64 = 256.0;
 /// Cosine between normals of points that share.
 const SAME_NORMAL: f64 = 0.85;
 /// Rise over run of points that share.
@@ -32,13 +41,28 @@ const SAME_PLANE: f64 = 0.2;
 
 /// A pixel's sample while its tile is at work.
 #[derive(Clone, Copy, Debug, Default)]
-struct Work {
-    sight: Sight,
+struct Work<'g> {
+    sight: Sight<'g>,
     /// The camera sees nothing there; exposure must not take that for darkness.
     is_outside: bool,
     gathered: Option<Gathered>,
     direct: Rgb,
     indirect: Rgb,
+    /// What was too much for one pixel: of direct and of indirect light.
+    excess: [Rgb; 2],
+    /// What a gather ray may bring, luminance.
+    bound: f64,
+}
+
+/// What is known of a pixel before its sample.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'s> {
+    pub shadows: Shadows<'s>,
+    pub guide: Option<&'s Guide>,
+    /// What a gather ray brings is usually so many times what is expected,
+    pub usual: f64,
+    /// or so much luminance, whichever is more.
+    pub least_usual: f64,
 }
 
 /// The pixels of a tile: their rays, and where sums go.
@@ -66,46 +90,58 @@ impl Tile<'_> {
         estimator: &Estimator,
         before: &[u32],
         k: u32,
-        shadows: impl Fn(&TilePixel) -> Shadows<'s>,
+        known: impl Fn(&TilePixel) -> Known<'s>,
         ray: impl Fn(&TilePixel, &mut PixelSample) -> Option<(DVec3, DVec3)>,
         seen: &mut [Seen],
-        mut learn: impl FnMut(&TilePixel, usize, f64),
+        mut learn: impl FnMut(&TilePixel, Lesson),
     ) {
         let mut work = [Work::default(); PIXELS];
         for (n, pixel) in self.pixels.iter().enumerate() {
             let mut numbers = PixelSample::new(self.seed, pixel.number, before[n] + k);
-            let shadows = shadows(pixel);
+            let Known { shadows, guide, usual, least_usual } = known(pixel);
             // Where the camera sees nothing, as beyond a fisheye's circle, the pixel stays black.
             let work = &mut work[n];
             let Some((origin, direction)) = ray(pixel, &mut numbers) else {
                 work.is_outside = true;
                 continue;
             };
-            work.sight = estimator.look(origin, direction, &mut numbers);
+            work.sight = estimator.look(origin, direction, guide, &mut numbers);
             let Some(point) = &work.sight.point else { continue };
+            let usual = (usual * point.expected.luminance()).max(least_usual);
+            work.bound = usual * BRIGHT.max(BRIGHT_SHARE * f64::from(before[n] + k));
             let (light, lamp) = estimator.lit(point, shadows, &mut numbers);
             work.direct = light;
             if let Some(lamp) = lamp {
-                learn(pixel, lamp, light.luminance());
+                learn(pixel, Lesson::Lamp(lamp, light.luminance()));
             }
             // Wherever tiles lie now, a pixel's directions are those of one square of pixels: its own are even in any case.
             let square = (pixel.y / SIDE) as u64 * MOST_SQUARES + (pixel.x / SIDE) as u64;
             let slot = pixel.y % SIDE * SIDE + pixel.x % SIDE;
             let u = net_point(mix(self.seed ^ mix(square)), dealt(before[n] + k, slot));
             work.gathered = estimator.gather(point, u, shadows, &mut numbers);
+            let Some(Gathered { lamp, emitted, direction, density, scattered, other }) = work.gathered else {
+                learn(pixel, Lesson::Reflected(light.luminance(), point.expected.luminance()));
+                continue;
+            };
+            let factor = reflected(point, direction);
             // What the BRDF's own ray found of a lamp is a lesson too: the rest of what it gives here.
-            if let Some(Gathered { lamp: Some(lamp), emitted, direction, density, .. }) = work.gathered {
-                learn(pixel, lamp, (reflected(point, direction) * emitted).luminance() / density);
+            if let Some(lamp) = lamp {
+                learn(pixel, Lesson::Lamp(lamp, (factor * emitted).luminance() / density));
             }
+            let all = emitted + other + scattered.map_or(Rgb::BLACK, |(radiance, _, _)| radiance);
+            let brought = (factor * all).luminance() / density;
+            learn(pixel, Lesson::Direction(direction, brought * brought * density));
+            learn(pixel, Lesson::Reflected(brought + light.luminance(), point.expected.luminance()));
         }
         self.share(&mut work);
-        for (work, seen) in work.iter().zip(seen) {
+        for (work, seen) in work.iter_mut().zip(seen) {
+            work.bound_direct();
             add(work, seen);
         }
     }
 
     /// Turns what was gathered into light that reaches the eye.
-    fn share(&self, work: &mut [Work; PIXELS]) {
+    fn share(&self, work: &mut [Work<'_>; PIXELS]) {
         let mut open: u32 = (1 << self.pixels.len()) - 1;
         while open != 0 {
             let leader = open.trailing_zeros() as usize;
@@ -146,23 +182,25 @@ fn members(group: u32) -> impl Iterator<Item = usize> + Clone {
 }
 
 /// Gives every member of a group what the gather rays of all found; points are at most `reach` from each other.
-fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
+fn collect(work: &mut [Work<'_>; PIXELS], group: u32, reach: f64) {
     for i in members(group) {
         let (Some(point), Some(gathered)) = (work[i].sight.point, work[i].gathered) else { continue };
         let Gathered { direction, density, emitted, scattered, other, .. } = gathered;
         let own = reflected(&point, direction) / density;
         work[i].direct += own * emitted;
-        work[i].indirect += limited(&point, own * other, CAUSTIC);
+        work[i].take(own * other, 1.0);
         let Some((radiance, end, normal)) = scattered else { continue };
         let nearest = |n: usize| work[n].sight.point.map_or(f64::INFINITY, |p| p.vertex.point.distance(end));
         let is_far = members(group).map(nearest).fold(f64::INFINITY, f64::min) > FAR * reach;
         if !is_far || group.count_ones() == 1 {
-            work[i].indirect += limited(&point, own * radiance, 1.0);
+            work[i].take(own * radiance, 1.0);
             continue;
         }
         if radiance.is_black() {
             continue;
         }
+        // A ray that many share shows as a square, but none of them has much of it.
+        let part = 1.0 / f64::from(group.count_ones()).sqrt();
         let (mut gives, mut densities) = ([Rgb::BLACK; PIXELS], 0.0);
         for j in members(group) {
             let Some(point) = &work[j].sight.point else { continue };
@@ -173,28 +211,46 @@ fn collect(work: &mut [Work; PIXELS], group: u32, reach: f64) {
             if geometry <= 0.0 || point.vertex.geometric.dot(direction) <= 0.0 {
                 continue;
             }
-            densities += geometry * point.brdf.pdf(direction);
+            densities += geometry * point.aim.pdf(direction);
             gives[j] = reflected(point, direction) * geometry;
         }
         if densities > 0.0 {
             for j in members(group) {
-                let Some(point) = &work[j].sight.point else { continue };
-                work[j].indirect += limited(point, gives[j] * radiance / densities, 1.0);
+                work[j].take(gives[j] * radiance / densities, part);
             }
         }
     }
 }
 
-/// What a gather ray brings, if that is not beyond all expectation.
-fn limited(point: &Point, light: Rgb, times: f64) -> Rgb {
-    let (luminance, limit) = (light.luminance(), times * point.limit);
-    if luminance > limit { light * (limit / luminance) } else { light }
+impl Work<'_> {
+    /// Takes what a gather ray brings: all of it if it is no more than `part` of the bound, and the rest is for many.
+    fn take(&mut self, light: Rgb, part: f64) {
+        let (luminance, bound) = (light.luminance(), part * self.bound);
+        if luminance <= bound {
+            self.indirect += light;
+            return;
+        }
+        let most = MOST * self.sight.point.map_or(0.0, |p| p.expected.luminance());
+        let kept = light * (bound / luminance);
+        self.indirect += kept;
+        self.excess[1] += light * (luminance.min(most).max(bound) / luminance) - kept;
+    }
+
+    /// Leaves to the pixel as much of its direct light as may be its own.
+    fn bound_direct(&mut self) {
+        let (luminance, bound) = (self.direct.luminance(), BRIGHTER * self.bound);
+        if luminance > bound {
+            let kept = self.direct * (bound / luminance);
+            self.excess[0] += self.direct - kept;
+            self.direct = kept;
+        }
+    }
 }
 
 /// Factor of what a point reflects to the eye of the radiance from `direction`: throughput · f_r · cosine.
 fn reflected(point: &Point, direction: DVec3) -> Rgb {
     let cosine = point.vertex.normal.dot(direction).max(0.0);
-    point.throughput * point.brdf.eval(direction) * cosine
+    point.throughput * point.aim.eval(direction) * cosine
 }
 
 /// Adds a pixel's sample to its sums.
@@ -212,6 +268,9 @@ fn add(work: &Work, seen: &mut Seen) {
     }
     seen.radiance += radiance;
     seen.direct += work.direct;
+    (0..2).for_each(|k| seen.excess[k] += work.excess[k]);
+    seen.excess_squares += (work.excess[0] + work.excess[1]).luminance().powi(2);
+    seen.expected += work.sight.point.map_or(Rgb::BLACK, |p| p.expected);
     seen.lights += lights;
     if !lights.is_black() {
         seen.covered += 1;

@@ -40,6 +40,11 @@ impl Brdf {
 }
 
 impl Towards {
+    /// Probability with which [`Towards::sample`] samples the lobe.
+    pub fn lobe_share(&self) -> f64 {
+        self.share
+    }
+
     /// As [`Brdf::eval`], or [`Brdf::lobe_eval`].
     #[inline]
     pub fn eval(&self, wi: DVec3) -> Rgb {
