@@ -69,7 +69,7 @@ const PICTURES: &str = "
 
 Three real interiors come with pictures by Tungsten, a path tracer. They stand beside ours in [gallery.md](gallery.md), judged by eye, with \
 what differs: the wood of the modern hall is brighter and redder here; in Veach's room behind the door teapots and checkerboard are \
-missing from the file; the grey and white room is still noisy here. The files' materials are approximations of the originals, and how \
+missing from the file; the grey and white room has a little grain here. The files' materials are approximations of the originals, and how \
 much of a difference is theirs has not been measured. How far pictures are from those of our own path tracer, which takes the very same \
 materials, is: [performance.md](performance.md#pictures).
 ";
