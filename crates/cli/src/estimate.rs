@@ -26,9 +26,10 @@ const LOOK_BYTES_PER_PATCH: usize = 318;
 const LOOK_BYTES_PER_SEEN_PATCH: usize = 150;
 /// Bytes of a pixel while its picture is made and encoded, and of one that paths are traced for.
 const PICTURE_BYTES_PER_PIXEL: usize = 60;
-const PATH_BYTES_PER_PIXEL: usize = 160;
-/// The same where neighbours share rays: sums, a copy of them, what was learnt of the lamps.
-const GATHER_BYTES_PER_PIXEL: usize = 160;
+const PATH_BYTES_PER_PIXEL: usize = 240;
+/// The same where neighbours share rays: sums, what they give each other, what was learnt of lamps and directions
+/// (320 with few lamps, 390 under a sky).
+const GATHER_BYTES_PER_PIXEL: usize = 360;
 /// The same for its layers: sums, what they become, and that as channels.
 const LAYER_BYTES_PER_PIXEL: usize = 200;
 /// What a thread keeps at hand: its stack as far as it is used, tasks of rays, the allocator's share.

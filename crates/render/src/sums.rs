@@ -102,12 +102,13 @@ impl PixelSums {
         self.seen.expected / f64::from(self.seen.rays.max(1))
     }
 
-    /// Gives the pixel its share of what was too much for others: mean direct and indirect light.
-    pub fn give(&mut self, [direct, indirect]: [Rgb; 2]) {
+    /// The pixel with its share of what was too much for others: mean direct and indirect light.
+    pub fn with(mut self, [direct, indirect]: [Rgb; 2]) -> Self {
         let rays = f64::from(self.seen.rays);
         self.seen.direct += direct * rays;
         self.seen.radiance += (direct + indirect) * rays;
         self.seen.unlit_luminance += (direct + indirect).luminance() * f64::from(self.seen.unlit);
+        self
     }
 
     /// True if no ray met a light.
@@ -154,24 +155,24 @@ pub(crate) fn relative_error(pixels: &[PixelSums]) -> f64 {
 }
 
 /// The picture of a film `width` pixels wide.
-pub(crate) fn picture(pixels: &[PixelSums], width: u32) -> Picture {
+pub(crate) fn picture(pixels: impl ExactSizeIterator<Item = PixelSums> + Clone, width: u32) -> Picture {
     let height = pixels.len() as u32 / width.max(1);
-    let empty: f64 = pixels.iter().map(|p| f64::from(p.seen.empty) / f64::from(p.rays().max(1))).sum();
-    let lights = |p: &PixelSums| (p.lights().to_f32(), (f64::from(p.seen.covered) / f64::from(p.rays().max(1))) as f32);
+    let empty: f64 = pixels.clone().map(|p| f64::from(p.seen.empty) / f64::from(p.rays().max(1))).sum();
+    let lights = |p: PixelSums| (p.lights().to_f32(), (f64::from(p.seen.covered) / f64::from(p.rays().max(1))) as f32);
     Picture {
-        image: Image { width, height, pixels: pixels.iter().map(|p| p.radiance().to_f32()).collect() },
-        lights: pixels.iter().map(lights).collect(),
-        log2_luminance: log2_luminance(pixels, width as usize),
+        image: Image { width, height, pixels: pixels.clone().map(|p| p.radiance().to_f32()).collect() },
+        lights: pixels.clone().map(lights).collect(),
+        log2_luminance: log2_luminance(pixels.clone(), width as usize),
         empty: empty / pixels.len().max(1) as f64,
     }
 }
 
 /// Mean of log₂ luminance for automatic exposure, where camera rays met surfaces without emission. The logarithm is
 /// that of tiles: of single paths, or of pixels of a few, it would be darker by all of their noise.
-fn log2_luminance(pixels: &[PixelSums], width: usize) -> Option<f64> {
+fn log2_luminance(pixels: impl ExactSizeIterator<Item = PixelSums>, width: usize) -> Option<f64> {
     let columns = width.div_ceil(TILE);
     let mut tiles = vec![(0.0, 0.0); columns * (pixels.len() / width.max(1)).div_ceil(TILE)];
-    for (index, p) in pixels.iter().enumerate() {
+    for (index, p) in pixels.enumerate() {
         // Pixels count alike, however many rays they have.
         let rays = f64::from(p.rays().max(1));
         let tile = &mut tiles[index / width / TILE * columns + index % width / TILE];

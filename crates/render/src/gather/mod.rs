@@ -15,7 +15,7 @@ mod sample;
 mod spread;
 mod tile;
 
-use twinray_scene::{Camera, PatchScene};
+use twinray_scene::{Camera, PatchScene, Rgb};
 use twinray_solve::Solution;
 
 use crate::film::{Crop, Film};
@@ -85,17 +85,17 @@ impl<'a> Gather<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        sums::picture(&self.given(), self.film.window.width)
+        sums::picture(self.given(&self.shares()), self.film.window.width)
     }
 
     /// The part of every pixel that is emitted where it is seen, or reflected straight from what emits; linear radiance.
     pub fn direct(&self) -> Vec<[f32; 3]> {
-        self.given().iter().map(|p| (p.lights() + p.direct()).to_f32()).collect()
+        self.given(&self.shares()).map(|p| (p.lights() + p.direct()).to_f32()).collect()
     }
 
     /// All other light of every pixel, linear radiance.
     pub fn indirect(&self) -> Vec<[f32; 3]> {
-        self.given().iter().map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
+        self.given(&self.shares()).map(|p| (p.radiance() - p.lights() - p.direct()).to_f32()).collect()
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
@@ -107,7 +107,7 @@ impl<'a> Gather<'a> {
     /// Relative RMS error of the pixels' luminance by their noise, √(Σ variance / Σ 𝓛²), over pixels that no light
     /// covers; over all pixels if there are no others. Infinite before the second batch; 0 in the dark.
     pub fn relative_error(&self) -> f64 {
-        sums::relative_error(&self.given())
+        sums::relative_error(&self.pixels)
     }
 
     /// Camera rays that were dropped because their radiance was not finite; 0 unless something is wrong.
@@ -115,12 +115,14 @@ impl<'a> Gather<'a> {
         self.pixels.iter().map(|p| u64::from(p.invalid())).sum()
     }
 
-    /// Sums of the pixels with their shares of what is for many.
-    fn given(&self) -> Vec<PixelSums> {
-        let mut pixels = self.pixels.clone();
-        let shares = spread::spread(&pixels, self.film.window.width as usize);
-        pixels.iter_mut().zip(shares).for_each(|(pixel, share)| pixel.give(share));
-        pixels
+    /// What pixels get of what is too much for others.
+    fn shares(&self) -> Vec<[Rgb; 2]> {
+        spread::spread(&self.pixels, self.film.window.width as usize)
+    }
+
+    /// Sums of the pixels with their shares.
+    fn given<'s>(&'s self, shares: &'s [[Rgb; 2]]) -> impl ExactSizeIterator<Item = PixelSums> + Clone + 's {
+        self.pixels.iter().zip(shares).map(|(pixel, share)| pixel.with(*share))
     }
 
     /// Sums of a pixel of the window.

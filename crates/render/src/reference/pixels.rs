@@ -94,7 +94,7 @@ impl<'a> PixelTracer<'a> {
 
     /// The picture so far.
     pub fn picture(&self) -> Picture {
-        sums::picture(&self.pixels, self.film.window.width)
+        sums::picture(self.pixels.iter().copied(), self.film.window.width)
     }
 
     /// Variance of every pixel's luminance, `[height, width]`: the square of its standard error; infinite before the
