@@ -39,7 +39,7 @@ const SCENES: &str = "TWINRAY_SCENES";
 
 /// Scenes, the paths per pixel of their reference, and how many times faster is aimed at.
 const CASES: [(&str, u32, f64); 4] = [
-    ("cornell", 96, 3.0),
+    ("cornell", 384, 3.0),
     ("hall", 96, 3.0),
     ("modern-hall/modern-hall.glb", 96, 3.0),
     ("veach-ajar/veach-ajar.glb", 160, 10.0),
