@@ -35,8 +35,10 @@ pub enum Command {
     Reference(ReferenceArgs),
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
-    /// Write the light of every patch as a table or a mesh for other programs
+    /// Write the light of every patch as a table or a mesh for other programs, or a walk-through as one HTML file
     Export(ExportArgs),
+    /// Walk through a scene in a browser while it is solved, or through the light of a .twin file
+    View(Box<ViewerArgs>),
     /// Say how far a picture or a solution is from a reference
     Compare(CompareArgs),
     /// Write a built-in scene (or convert a file) to glTF or OBJ, so that other programs can load it
@@ -357,9 +359,64 @@ pub struct ExportArgs {
     /// The solution, a .twin file, and its scene.
     #[command(flatten)]
     pub load: LoadArgs,
-    /// File to write: .npz (NumPy), .csv, .ply (mesh) or .vtu (ParaView)
+    /// File to write: .npz (NumPy), .csv, .ply (mesh), .vtu (ParaView), or .html (a walk-through in one file)
     #[arg(long, short, value_name = "FILE", required = true)]
     pub output: PathBuf,
+    /// Of .html: the longer side of textures, pixels, at most
+    #[arg(long, value_name = "PIXELS", default_value = "1024", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    pub texture_size: u32,
+    /// Of .html: what irradiance is called
+    #[arg(long, value_name = "UNIT", value_enum, default_value = "lx")]
+    pub unit_name: UnitName,
+}
+
+/// What the scene's numbers mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum UnitName {
+    /// Radiance is in nit, irradiance in lux.
+    Lx,
+    /// Radiance is in W·sr⁻¹·m⁻², irradiance in W·m⁻².
+    Watt,
+}
+
+impl UnitName {
+    /// The unit of irradiance as it is written.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            UnitName::Lx => "lx",
+            UnitName::Watt => "W/m²",
+        }
+    }
+}
+
+/// `twinray view`.
+#[derive(Debug, clap::Args)]
+pub struct ViewerArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Solver.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// Port of 127.0.0.1 to serve on [default: a free one]
+    #[arg(long, value_name = "PORT")]
+    pub port: Option<u16>,
+    /// Open the page in the browser of this desktop
+    #[arg(long)]
+    pub open: bool,
+    /// What the address begins with, so that a page finds its server again when that is restarted: 16 letters and digits or more
+    /// [default: random]
+    #[arg(long, value_name = "TOKEN")]
+    pub token: Option<String>,
+    /// Keep the light in this .twin file when the solve ends, by itself or by Ctrl-C
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// The longer side of textures, pixels, at most
+    #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    pub texture_size: u32,
+    /// What irradiance is called
+    #[arg(long, value_name = "UNIT", value_enum, default_value = "lx")]
+    pub unit_name: UnitName,
 }
 
 /// `twinray compare`.

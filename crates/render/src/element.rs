@@ -53,7 +53,7 @@ pub struct Elements {
 
 impl Elements {
     /// Pools the patches of a scene. O(K).
-    pub fn new(scene: &PatchScene, solution: &Solution) -> Self {
+    pub fn new(scene: &PatchScene) -> Self {
         let patches: Vec<PatchId> = scene.patches().collect();
         let places: Vec<(DVec3, DVec3)> =
             patches.par_iter().map(|&p| (scene.cell_centre(p), display_normal(scene, p))).collect();
@@ -105,27 +105,36 @@ impl Elements {
                 }
             }
         }
-        let list = pools.par_iter().map(|pool| pooled(scene, solution, &places, pool)).collect();
+        let list = pools.par_iter().map(|pool| pooled(scene, &places, pool)).collect();
         Self { list, of_patch, typical_size }
+    }
+
+    /// Gives every element the mean light of its patches. O(K).
+    pub fn light(&mut self, scene: &PatchScene, solution: &Solution) {
+        for element in &mut self.list {
+            element.irradiance = Rgb::BLACK;
+            element.lobe = solution.observed_lobe(element.patch).map(|_| [Rgb::BLACK; 2]);
+        }
+        for patch in scene.patches() {
+            let element = &mut self.list[self.of_patch[patch.index()] as usize];
+            let share = scene.area(patch) / element.area;
+            element.irradiance += solution.irradiance(patch) * share;
+            if let (Some(sum), Some(lobe)) = (&mut element.lobe, solution.observed_lobe(patch)) {
+                sum[0] += lobe[0] * share;
+                sum[1] += lobe[1] * share;
+            }
+        }
     }
 }
 
-fn pooled(scene: &PatchScene, solution: &Solution, places: &[(DVec3, DVec3)], pool: &[PatchId]) -> Element {
+/// Small patches as one element, dark.
+fn pooled(scene: &PatchScene, places: &[(DVec3, DVec3)], pool: &[PatchId]) -> Element {
     let area: f64 = pool.iter().map(|&p| scene.area(p)).sum();
-    let mean = |of: &dyn Fn(PatchId) -> Rgb| pool.iter().map(|&p| of(p) * scene.area(p)).sum::<Rgb>() / area;
     let middle = pool.iter().map(|p| places[p.index()].0 * scene.area(*p)).sum::<DVec3>() / area;
     let distance = |p: &PatchId| places[p.index()].0.distance_squared(middle);
     let patch = pool.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(pool[0]);
     let (centre, normal) = places[patch.index()];
-    let part = |k: usize| mean(&|p| solution.observed_lobe(p).map_or(Rgb::BLACK, |l| l[k]));
-    Element {
-        patch,
-        centre,
-        normal,
-        area,
-        irradiance: mean(&|p| solution.irradiance(p)),
-        lobe: solution.observed_lobe(patch).map(|_| [part(0), part(1)]),
-    }
+    Element { patch, centre, normal, area, irradiance: Rgb::BLACK, lobe: None }
 }
 
 /// Vertex normals at a cell's centre: a hit's own are interpolated the same way.

@@ -19,6 +19,7 @@ mod reconstruct;
 pub mod reference;
 mod sums;
 mod vertex;
+pub mod walk;
 
 pub use aovs::{AovOptions, Aovs, aovs};
 pub use display::{Exposure, PhysicalCamera, ToneCurve, WhiteBalance};

@@ -86,6 +86,12 @@ enum Kernel {
 pub struct Reconstruction<'a> {
     scene: &'a PatchScene,
     solution: &'a Solution,
+    surfaces: Surfaces,
+}
+
+/// What is known of a scene's surfaces whatever their light: it outlives solutions.
+#[derive(Debug)]
+pub struct Surfaces {
     elements: Elements,
     grid: Grid,
     parts: Vec<OnceLock<Box<[Part]>>>,
@@ -93,27 +99,43 @@ pub struct Reconstruction<'a> {
     neighbours: Vec<OnceLock<Vec<Box<[Neighbour]>>>>,
 }
 
-impl<'a> Reconstruction<'a> {
+impl Surfaces {
     /// Prepares the search for neighbours. O(K log K).
-    pub fn new(scene: &'a PatchScene, solution: &'a Solution) -> Self {
-        let elements = Elements::new(scene, solution);
+    pub fn new(scene: &PatchScene) -> Self {
+        let elements = Elements::new(scene);
         let centres: Vec<DVec3> = elements.list.iter().map(|e| e.centre).collect();
         let count = centres.len();
         Self {
-            scene,
-            solution,
             grid: Grid::new(RADIUS * elements.typical_size, &centres),
             elements,
             parts: (0..count).map(|_| OnceLock::new()).collect(),
             neighbours: (0..count).map(|_| OnceLock::new()).collect(),
         }
     }
+}
+
+impl<'a> Reconstruction<'a> {
+    /// Prepares the search for neighbours. O(K log K).
+    pub fn new(scene: &'a PatchScene, solution: &'a Solution) -> Self {
+        Self::over(scene, solution, Surfaces::new(scene))
+    }
+
+    /// The same where the scene's surfaces are known already. O(K).
+    pub fn over(scene: &'a PatchScene, solution: &'a Solution, mut surfaces: Surfaces) -> Self {
+        surfaces.elements.light(scene, solution);
+        Self { scene, solution, surfaces }
+    }
+
+    /// What has been learnt of the scene's surfaces.
+    pub fn into_surfaces(self) -> Surfaces {
+        self.surfaces
+    }
 
     /// Light at a hit on `patch`, smooth across cells.
     pub fn smooth(&self, patch: PatchId, hit: &SurfaceHit) -> Smooth {
         let x = self.scene.point_of(hit.triangle, hit.u, hit.v);
         let n = self.scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
-        let own = self.elements.of_patch[patch.index()];
+        let own = self.surfaces.elements.of_patch[patch.index()];
         let parts = self.parts(own);
         let part = match parts.len() {
             0 => None,
@@ -181,13 +203,13 @@ impl<'a> Reconstruction<'a> {
     }
 
     fn element(&self, element: u32) -> &Element {
-        &self.elements.list[element as usize]
+        &self.surfaces.elements.list[element as usize]
     }
 
     /// Side of an element for the kernel: single huge triangles among small ones keep to themselves, or the search
     /// for their neighbours would cross the whole scene.
     fn size(&self, element: &Element) -> f64 {
-        let typical = self.elements.typical_size;
+        let typical = self.surfaces.elements.typical_size;
         element.area.sqrt().clamp(typical, 4.0 * typical)
     }
 
@@ -198,7 +220,7 @@ impl<'a> Reconstruction<'a> {
 
     /// Neighbours of each part of an element.
     fn neighbours(&self, own: u32) -> &[Box<[Neighbour]>] {
-        self.neighbours[own as usize].get_or_init(|| {
+        self.surfaces.neighbours[own as usize].get_or_init(|| {
             let here = self.element(own);
             let reach = self.radius(here) + 1.2 * self.size(here);
             let mut near = self.same_surface(&self.place(here), reach);
@@ -231,6 +253,7 @@ impl<'a> Reconstruction<'a> {
     /// Elements within `reach` of a point whose normals and places fit its surface, nearest first.
     fn same_surface(&self, place: &Place, reach: f64) -> Vec<u32> {
         let mut found: Vec<(f64, u32)> = self
+            .surfaces
             .grid
             .near(place.x, reach)
             .filter_map(|k| {
@@ -253,16 +276,16 @@ impl<'a> Reconstruction<'a> {
         let there = self.element(other).normal;
         let offset = to - from;
         let rise = offset.dot(normal).abs().max(offset.dot(there).abs());
-        let lift = 0.03 * self.elements.typical_size + 0.4 * rise;
+        let lift = 0.03 * self.surfaces.elements.typical_size + 0.4 * rise;
         self.scene.visible(from + normal * lift, normal, to + there * lift, there)
     }
 
     /// The free parts of an element, judged by the patch that stands for it.
     fn parts(&self, element: u32) -> &[Part] {
-        self.parts[element as usize].get_or_init(|| {
+        self.surfaces.parts[element as usize].get_or_init(|| {
             let here = self.element(element);
             let Element { patch, centre, normal, .. } = *here;
-            let mut witnesses = self.same_surface(&self.place(here), RADIUS * self.elements.typical_size);
+            let mut witnesses = self.same_surface(&self.place(here), RADIUS * self.surfaces.elements.typical_size);
             witnesses.retain(|&w| w != element);
             witnesses.truncate(8);
             let seen = witnesses.iter().filter(|&&w| self.sees(centre, normal, w, self.element(w).centre)).count();
@@ -296,7 +319,8 @@ impl<'a> Reconstruction<'a> {
     fn covered(&self, patch: PatchId, point: DVec3) -> bool {
         let scene = self.scene;
         scene.trace_from(patch, point, scene.normal(patch)).is_some_and(|hit| {
-            hit.t < TOUCHING * self.elements.typical_size || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
+            hit.t < TOUCHING * self.surfaces.elements.typical_size
+                || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
         })
     }
 

@@ -484,6 +484,39 @@ impl PatchScene {
         self.triangles[self.triangle_of(patch) as usize].material as usize
     }
 
+    /// Number of sides of a triangle that have patches: 2 where it has two sides.
+    pub fn sides_of(&self, triangle: u32) -> u32 {
+        sides(&self.triangles[triangle as usize])
+    }
+
+    /// How a triangle is cut.
+    pub fn cells_of(&self, triangle: u32) -> Cells {
+        self.triangles[triangle as usize].cells
+    }
+
+    /// Index of a triangle's material.
+    pub fn material_index(&self, triangle: u32) -> usize {
+        self.triangles[triangle as usize].material as usize
+    }
+
+    /// All materials, in the order of the scene.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// Pictures of all textures, in the order of the scene.
+    pub fn images(&self) -> &[Arc<TextureImage>] {
+        &self.images
+    }
+
+    /// Texture coordinates at a triangle's vertices, of set 0 or 1; `None` if its mesh has none.
+    pub fn vertex_texcoords(&self, triangle: u32, set: u8) -> Option<[[f32; 2]; 3]> {
+        match set {
+            0 => self.attributes[triangle as usize].texcoords,
+            _ => self.second_texcoords.get(triangle as usize).copied().flatten(),
+        }
+    }
+
     /// Triangle corners, in this scene's coordinates.
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         [0, 1, 2].map(|i| self.triangles[triangle as usize].vertex(i))

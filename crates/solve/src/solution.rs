@@ -94,6 +94,13 @@ impl Solution {
         })
     }
 
+    /// What a glossy patch remembers: irradiance C/l · I(m), W·m⁻², and the direction it came from. Its reflection is right
+    /// only in the mean over solutions. `None` for other patches, and before light has come. Paper: §2.1.
+    pub fn representative(&self, patch: PatchId) -> Option<(Rgb, DVec3)> {
+        let directional = self.glossy.number_of(patch).and_then(|k| self.glossy_light[k].directional);
+        directional.map(|d| (d.irradiance, d.wi))
+    }
+
     /// Radiance that the lobe of a glossy patch sends to the observer given to the solver, averaged over all
     /// iterations: of light that comes straight from emitting patches, and of all other light (the paper's schedule
     /// cannot tell them apart and calls all of it other). `None` for diffuse patches, without an observer, or if the

@@ -8,7 +8,7 @@ use serde_json::json;
 use twinray::format::{self, CellTable, Provenance, StoredSolution};
 
 use crate::args::{ExportArgs, SolveArgs};
-use crate::commands;
+use crate::commands::{self, view};
 use crate::estimate::Work;
 use crate::failure::Ending;
 use crate::input::{self, Loaded};
@@ -19,7 +19,8 @@ use crate::stored;
 /// Runs the command.
 pub fn run(args: &ExportArgs) -> anyhow::Result<Ending> {
     let name = &args.load.scene;
-    let write = writer(&args.output)?;
+    let is_page = extension(&args.output) == "html";
+    let write = if is_page { None } else { Some(writer(&args.output)?) };
     if !stored::is_solution(name) {
         bail!("{name}: is no solution; expected a .twin file: `twinray solve {name}` writes one");
     }
@@ -29,8 +30,16 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Ending> {
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     let Some(stored) = &loaded.stored else { unreachable!("a solution was loaded") };
     let file = stored.read()?;
-    let table = table(name, &loaded, &file)?;
-    output.put(|out| write(&table, out))?;
+    match write {
+        Some(write) => {
+            let table = table(name, &loaded, &file)?;
+            output.put(|out| write(&table, out))?;
+        }
+        None => {
+            let page = view::export(name, &args.output, &loaded, args.texture_size, args.unit_name.as_str())?;
+            output.put(|out| out.write_all(&page))?;
+        }
+    }
     report(args, &loaded, file.provenance());
     Ok(Ending::Done)
 }
@@ -44,7 +53,7 @@ fn writer(path: &Path) -> anyhow::Result<Writer> {
         "csv" => |table, out| format::write_csv(table, out),
         "ply" => |table, out| format::write_ply(table, out),
         "vtu" => |table, out| format::write_vtu(table, out),
-        _ => bail!("{}: expected a name that ends in .npz, .csv, .ply or .vtu", path.display()),
+        _ => bail!("{}: expected a name that ends in .npz, .csv, .ply, .vtu or .html", path.display()),
     })
 }
 

@@ -14,6 +14,7 @@ pub mod scene;
 mod solution;
 pub mod solve;
 mod solving;
+pub mod view;
 
 use serde_json::{Value, json};
 use twinray::solve::PowerBalance;

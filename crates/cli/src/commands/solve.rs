@@ -161,7 +161,7 @@ fn spare(path: &Path, loaded: &Loaded) -> anyhow::Result<()> {
 }
 
 /// Keeps what a solver has in a file.
-struct Keeper<'a> {
+pub(super) struct Keeper<'a> {
     /// `None` where another process writes.
     output: Option<Output>,
     loaded: &'a Loaded,
@@ -169,7 +169,7 @@ struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    fn new(loaded: &'a Loaded, settings: Settings, path: &Path, output: Option<Output>) -> Self {
+    pub(super) fn new(loaded: &'a Loaded, settings: Settings, path: &Path, output: Option<Output>) -> Self {
         // A link to a file stays one, and its scene is seen from where the file is.
         let real = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let folder = real.parent().unwrap_or(Path::new("")).to_owned();
@@ -191,7 +191,7 @@ impl<'a> Keeper<'a> {
     }
 
     /// Writes it, and says how large the error is.
-    fn keep(&mut self, solver: &Solver) -> anyhow::Result<f64> {
+    pub(super) fn keep(&mut self, solver: &Solver) -> anyhow::Result<f64> {
         let patches = &self.loaded.patches;
         let record = solver.record();
         let area = patches.patches().map(|p| patches.area(p)).collect();
@@ -216,7 +216,7 @@ impl<'a> Keeper<'a> {
 
     /// Keeps what has no room in its own place in the folder for temporary files instead; `error` is why, and is told with
     /// the place.
-    fn rescue(&mut self, solver: &Solver, error: anyhow::Error) -> anyhow::Error {
+    pub(super) fn rescue(&mut self, solver: &Solver, error: anyhow::Error) -> anyhow::Error {
         let Some(output) = &self.output else { return error };
         let name = Path::new(output.name()).file_name().unwrap_or_default().to_string_lossy().into_owned();
         let path = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));

@@ -1,0 +1,184 @@
+//! What arrives at a glossy place from all directions, in spherical harmonics of degree 2 and less.
+//!
+//! Radiance of the hemisphere, mirrored below the surface so that it has no step at the horizon, which few harmonics
+//! could not follow. Gathered by rays from the place, light straight from what emits by shadow rays, so that small lamps
+//! make no noise; sums go on over solutions. Basis: Ramamoorthi and Hanrahan, "An efficient representation for irradiance
+//! environment maps" (SIGGRAPH 2001), whose convolution the viewer does with the lobe in place of the cosine.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use twinray_scene::geom::Frame;
+use twinray_scene::sample::Stream;
+use twinray_scene::{PatchId, PatchScene, Rgb, Side};
+use twinray_solve::Solution;
+
+use super::nodes::{Nodes, Place};
+use crate::lights::Lights;
+
+/// Number of harmonics.
+pub const BASIS: usize = 9;
+
+/// Rays into the hemisphere of a place in one round.
+const RAYS: u32 = 48;
+/// Shadow rays of a place in one round.
+const SHADOW_RAYS: u32 = 16;
+/// Panes that a ray passes.
+const MOST_PANES: u32 = 8;
+
+/// Real spherical harmonics of degree 0, 1, 2 in direction `d`, a unit vector: Y00; Y1 of y, z, x; Y2 of xy, yz,
+/// 3z² − 1, xz, x² − y².
+pub fn basis(d: DVec3) -> [f64; BASIS] {
+    [
+        0.282_094_791_773_878_1,
+        0.488_602_511_902_919_9 * d.y,
+        0.488_602_511_902_919_9 * d.z,
+        0.488_602_511_902_919_9 * d.x,
+        1.092_548_430_592_079_2 * d.x * d.y,
+        1.092_548_430_592_079_2 * d.y * d.z,
+        0.315_391_565_252_520_05 * (3.0 * d.z * d.z - 1.0),
+        1.092_548_430_592_079_2 * d.x * d.z,
+        0.546_274_215_296_039_6 * (d.x * d.x - d.y * d.y),
+    ]
+}
+
+/// Moments of the radiance that arrives.
+type Moments = [Rgb; BASIS];
+
+/// Moments of all glossy nodes, summed up over rounds.
+#[derive(Debug, Default)]
+pub(crate) struct Lobes {
+    sums: Vec<Moments>,
+    weight: f64,
+    rounds: u64,
+}
+
+impl Lobes {
+    /// Gathers once more from `solution`, which counts with `weight`.
+    pub fn gather(&mut self, scene: &PatchScene, lights: &Lights, nodes: &Nodes, solution: &Solution, weight: f64) {
+        let places = &nodes.places[..nodes.glossy_nodes];
+        self.sums.resize(places.len(), [Rgb::BLACK; BASIS]);
+        let round = self.rounds;
+        let gathered = self.sums.par_iter_mut().zip(places).enumerate();
+        gathered.for_each(|(index, (sum, place))| {
+            let mut random = Stream::new(round, 0x10BE5, index as u64);
+            let moments = moments(scene, lights, solution, place, &mut random);
+            sum.iter_mut().zip(moments).for_each(|(s, m)| *s += m * weight);
+        });
+        self.weight += weight;
+        self.rounds += 1;
+    }
+
+    /// Mean moments per glossy node.
+    pub fn means(&self) -> impl Iterator<Item = Moments> + '_ {
+        self.sums.iter().map(|sum| sum.map(|s| s / self.weight))
+    }
+}
+
+/// One round's moments at a place.
+fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Place, random: &mut Stream) -> Moments {
+    let hit = &place.hit;
+    let point = scene.point_of(hit.triangle, hit.u, hit.v);
+    let front = scene.normal(place.patch);
+    let normal = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+    let frame = Frame::from_normal(front);
+    let mut sum = [Rgb::BLACK; BASIS];
+    let mut add = |direction: DVec3, radiance: Rgb| {
+        // The mirror image makes the other half of the sphere.
+        let below = direction - 2.0 * normal.dot(direction) * normal;
+        let (a, b) = (basis(direction), basis(below));
+        for (k, s) in sum.iter_mut().enumerate() {
+            *s += radiance * (a[k] + b[k]);
+        }
+    };
+    // A golden lattice, shifted for each place and round.
+    let shift = [random.uniform(), random.uniform()];
+    for k in 0..RAYS {
+        let z = ((f64::from(k) + shift[0]) / f64::from(RAYS)).fract();
+        let angle = TAU * (f64::from(k) * 0.618_033_988_749_895 + shift[1]);
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        let (sin, cos) = libm::sincos(angle);
+        let direction = frame.to_world(DVec3::new(radius * cos, radius * sin, z));
+        let radiance = reflected_towards(scene, solution, place.patch, point, direction);
+        add(direction, radiance * (TAU / f64::from(RAYS)));
+    }
+    for _ in 0..SHADOW_RAYS {
+        let (choice, at) = (random.uniform(), [random.uniform(), random.uniform()]);
+        let Some(light) = lights.sample(point, choice, at) else { continue };
+        if front.dot(light.towards) <= 0.0 {
+            continue;
+        }
+        let seen = match light.end {
+            Some((end, normal_there)) => scene.transmittance(point, front, end, normal_there),
+            None => scene.transmittance_from_sky(place.patch, point, light.towards),
+        };
+        add(light.towards, light.radiance * seen / (light.density * f64::from(SHADOW_RAYS)));
+    }
+    sum
+}
+
+/// What surfaces reflect towards `point` from `direction`; emitted light is left to shadow rays.
+fn reflected_towards(scene: &PatchScene, solution: &Solution, patch: PatchId, point: DVec3, direction: DVec3) -> Rgb {
+    let (mut hit, mut origin, mut through) = (scene.trace_from(patch, point, direction), point, Rgb::WHITE);
+    for _ in 0..MOST_PANES {
+        let Some(met) = hit else { return Rgb::BLACK };
+        let there = scene.patch_of(&met);
+        let passing = there.and_then(|p| scene.specular(p));
+        let mut reflected = Rgb::BLACK;
+        if let Some(p) = there {
+            let scatter = scene.scatter(p);
+            let [mirrored, transmitted] = passing.map_or([Rgb::BLACK; 2], |s| s.throughput(0.5, false));
+            // Mirrors, as if they were matte: their patches know what arrives.
+            reflected =
+                through * solution.irradiance(p) * (scatter.brdf.mean_albedo() + mirrored) / std::f64::consts::PI;
+            through = through * transmitted;
+        }
+        if through.is_black() || (there.is_some() && passing.is_none()) {
+            return reflected;
+        }
+        let normal = there.map_or(-direction, |p| scene.normal(p));
+        origin += direction * met.t;
+        let before = if normal.dot(direction) > 0.0 { -normal } else { normal };
+        hit = scene.beyond(met.triangle, before, origin, direction);
+        if met.side == Side::Back && there.is_none() {
+            // The back of a one-sided surface is not there for eyes.
+            continue;
+        }
+    }
+    Rgb::BLACK
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twinray_scene::sample::warp;
+
+    #[test]
+    fn harmonics_are_orthonormal() {
+        let mut random = Stream::new(1, 2, 3);
+        let mut sum = [[0.0; BASIS]; BASIS];
+        const N: u32 = 200_000;
+        for _ in 0..N {
+            let u = [random.uniform(), random.uniform()];
+            let hemisphere = warp::cosine_hemisphere(u);
+            // Uniform over the sphere by its height.
+            let z = 2.0 * random.uniform() - 1.0;
+            let r = (1.0 - z * z).sqrt();
+            let flat = DVec3::new(hemisphere.x, hemisphere.y, 0.0).normalize_or(DVec3::X) * r;
+            let y = basis(DVec3::new(flat.x, flat.y, z));
+            for (i, row) in sum.iter_mut().enumerate() {
+                row.iter_mut()
+                    .enumerate()
+                    .for_each(|(j, s)| *s += y[i] * y[j] * 4.0 * std::f64::consts::PI / f64::from(N));
+            }
+        }
+        for (i, row) in sum.iter().enumerate() {
+            for (j, s) in row.iter().enumerate() {
+                let expected = if i == j { 1.0 } else { 0.0 };
+                // Standard deviation of a mean of products of at most 2.2 in size: below .006.
+                assert!((s - expected).abs() < 0.025, "{i}, {j}: {s}");
+            }
+        }
+    }
+}
