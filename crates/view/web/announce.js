@@ -14,8 +14,8 @@ export function element(id) {
     return found;
 }
 
-/** A note that goes away by itself, read aloud too. @param {string} text */
-export function toast(text) {
+/** A note that goes away by itself, read aloud too. @param {string} text @param {number} [milliseconds] */
+export function toast(text, milliseconds = SHOWN_MILLISECONDS) {
     const note = element("toast");
     note.textContent = text;
     note.dataset.shown = "true";
@@ -24,7 +24,7 @@ export function toast(text) {
         delete note.dataset.shown;
         // A live region speaks again only if its text has changed in between.
         note.textContent = "";
-    }, SHOWN_MILLISECONDS);
+    }, milliseconds);
 }
 
 /** For screen readers only: what others see at its place in the picture. @param {string} text */

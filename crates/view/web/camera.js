@@ -138,6 +138,16 @@ export function between(from, to, t) {
     return turned({ ...from, eye: mix(from.eye, to.eye, t), fov: from.fov + (to.fov - from.fov) * t }, angles);
 }
 
+/**
+ * The pose that sees a whole scene from outside, from its south-east and a little above.
+ * @type {(radius: number) => Pose}
+ */
+export function overview(radius) {
+    const fov = Math.PI / 4;
+    const { forward, up } = frameOf({ yaw: -Math.PI / 6, pitch: -Math.PI / 7, roll: 0 });
+    return { eye: scale(forward, (-1.05 * radius) / Math.sin(fov / 2)), forward, up, fov };
+}
+
 /** Slow at both ends. @param {number} t */
 export const ease = (t) => t * t * (3 - 2 * t);
 
@@ -305,11 +315,17 @@ export class Camera {
 
     /** Comes `factor` as near to a point, which becomes the depth that orbits go around. @param {Vec3} point @param {number} factor */
     dolly(point, factor) {
-        const distance = length(sub(point, this.#pose.eye));
-        const allowed = this.#allowed(distance * factor);
-        if (!(distance > 0)) return;
-        const pose = dolly(this.#pose, point, allowed / distance);
-        this.set(pose, dot(sub(point, pose.eye), pose.forward));
+        const depth = dot(sub(point, this.#pose.eye), this.#pose.forward);
+        if (!(depth > 0)) return;
+        // At the limit one stays: a correction that pushed back and let come again would creep through what is there.
+        const next = this.#allowed(depth * factor);
+        if (factor < 1 === next >= depth) return;
+        this.set(dolly(this.#pose, point, next / depth), next);
+    }
+
+    /** Says how far away that is around which to turn; the picture stays as it is. @param {number} distance */
+    aim(distance) {
+        this.#distance = this.#allowed(distance);
     }
 
     /** Looks at a point from nearer by. @param {Vec3} point */

@@ -7,7 +7,7 @@
 /**
  * Polynomials of degree 5 and 6 in `t` from 0 to 1, per channel from the constant upwards, that give sRGB.
  * turbo: A. Mikhailov, "Turbo, An Improved Rainbow Colormap for Visualization", Google AI Blog, 2019; fit by R. Du. It tells
- * the most levels apart, and its lightness rises and falls only once.
+ * the most levels apart, and its lightness rises and falls only once. (gist.github.com/mikhailov-work/0d177465a8151eb6)
  * viridis: S. van der Walt and N. Smith, matplotlib, 2015; fit by M. Zucker (CC0). Its lightness rises evenly, which holds for
  * colour-blind eyes and grey prints too.
  * @type {Record<MapName, number[][]>}

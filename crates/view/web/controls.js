@@ -211,7 +211,8 @@ export class Controls {
     #turnWheel = (/** @type {WheelEvent} */ event) => {
         event.preventDefault();
         const place = this.#place(event);
-        const pixels = event.deltaY * [1, 33, 400][event.deltaMode];
+        // A pinch on a touch pad arrives as a wheel with Ctrl, in steps of few pixels.
+        const pixels = event.deltaY * [1, 33, 400][event.deltaMode] * (event.ctrlKey ? 6 : 1);
         const factor = Math.exp(Math.min(Math.max(pixels, -300), 300) * WHEEL_SPEED);
         const now = event.timeStamp;
         const last = this.#wheel;
@@ -231,6 +232,7 @@ export class Controls {
 
     #keyDown = (/** @type {KeyboardEvent} */ event) => {
         this.#fast = event.shiftKey;
+        if (event.metaKey) this.#releaseKeys();
         if (keyIsTaken(event) || !HELD_KEYS[event.code]) return;
         event.preventDefault();
         this.#keys.add(event.code);
@@ -240,6 +242,8 @@ export class Controls {
     #keyUp = (/** @type {KeyboardEvent} */ event) => {
         this.#fast = event.shiftKey;
         this.#keys.delete(event.code);
+        // macOS tells nothing of keys that are let go while Command is down; they would be held for ever.
+        if (event.key === "Meta") this.#releaseKeys();
     };
 
     #releaseKeys = () => this.#keys.clear();

@@ -9,6 +9,8 @@ import { number } from "twinray/colours.js";
 /** @typedef {{ at: number, text: string }} Tick position from 0 to 1 and its label */
 
 const MOST_TICKS = 6;
+/** The share of the scale that the label of an end needs. */
+const END_ROOM = 0.12;
 
 /**
  * Round numbers on a scale: 1, 2 and 5 times powers of ten, as many as fit.
@@ -17,11 +19,15 @@ const MOST_TICKS = 6;
  */
 export function ticks({ low, high, logarithmic }) {
     if (!(high > low) || (logarithmic && !(low > 0))) return [];
-    const values = logarithmic ? decades(low, high) : steps(low, high);
-    return values.map((value) => ({
+    /** @type {(value: number) => Tick} */
+    const tick = (value) => ({
         at: logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low),
         text: number(value),
-    }));
+    });
+    const round = (logarithmic ? decades(low, high) : steps(low, high)).map(tick);
+    // The ends are what one asks first; a round number that is too near to one gives way to it.
+    const inner = round.filter(({ at }) => at > END_ROOM && at < 1 - END_ROOM);
+    return [{ ...tick(low), at: 0 }, ...inner, { ...tick(high), at: 1 }];
 }
 
 /** @param {number} low @param {number} high */

@@ -2,14 +2,15 @@
  * The panel's controls, bound both ways to the settings and the camera. What they do to the picture is not decided here.
  */
 
+import { cameraName } from "twinray/actions.js";
 import { element } from "twinray/announce.js";
 import { samePose } from "twinray/camera.js";
-import { count, number, quantity, stops } from "twinray/colours.js";
+import { count, number, stops } from "twinray/colours.js";
 
 /** @import { Camera } from "twinray/camera.js" */
-/** @import { Actions } from "twinray/shortcuts.js" */
+/** @import { Actions } from "twinray/actions.js" */
 /** @import { Settings } from "twinray/settings.js" */
-/** @import { Curve, MapName, Mode, NamedPose, Values, Walk } from "twinray/types.js" */
+/** @import { Curve, MapName, Mode, Values, Walk } from "twinray/types.js" */
 
 const DEGREES = 180 / Math.PI;
 /** Stops that the slider reaches to either side of automatic exposure. */
@@ -87,21 +88,18 @@ export class Panel {
         element("h-illuminance").textContent = unit.name === "lx" ? "Illuminance" : "Irradiance";
     }
 
-    /** @param {Actions} act */
+    /** The cameras of the scene; home has its own button beside the picture. @param {Actions} act */
     #listCameras(act) {
-        const home = document.createElement("button");
-        home.type = "button";
-        home.textContent = "Home";
-        home.addEventListener("click", act.home);
-        this.#cameras = this.#walk.cameras.map((camera, i) => {
+        element("cameras").hidden = this.#walk.cameras.length === 0;
+        this.#cameras = this.#walk.cameras.map((_, i) => {
             const button = document.createElement("button");
             button.type = "button";
-            button.textContent = camera.name || `Camera ${i + 1}`;
+            button.textContent = cameraName(this.#walk, i);
             button.title = i < 9 ? `${button.textContent} (${i + 1})` : button.textContent;
             button.addEventListener("click", () => act.camera(i));
             return button;
         });
-        element("cameras").append(home, ...this.#cameras);
+        element("cameras").append(...this.#cameras);
     }
 
     /** @param {Actions} act */
@@ -180,7 +178,6 @@ export class Panel {
         for (const id of ["pick", "tool-pick"]) element(id).setAttribute("aria-pressed", String(values.picking));
         element("pick").textContent = values.picking ? "Taking readings: click a point" : "Take readings";
         document.body.dataset.picking = String(values.picking);
-        element("crosshair").hidden = !values.picking;
     }
 
     /** @param {number} exposure */
@@ -225,9 +222,3 @@ function check(name, value) {
     const button = document.querySelector(`input[name="${name}"][value="${value}"]`);
     if (button instanceof HTMLInputElement) button.checked = true;
 }
-
-/** What a camera is called in announcements. @param {NamedPose[]} cameras @param {number} index */
-export const cameraName = (cameras, index) => cameras[index].name || `Camera ${index + 1}`;
-
-/** A range in words. @param {[number, number]} range @param {string} unit */
-export const rangeText = ([low, high], unit) => `${number(low)} to ${quantity(high, unit)}`;

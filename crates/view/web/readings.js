@@ -15,6 +15,8 @@ import { add, length, sub } from "twinray/vec.js";
 
 /** More marks than this hide the scene. */
 const MOST = 50;
+/** Nearer than this to the right edge, a mark has its words on the left; in pixels. */
+const EDGE = 100;
 /** Rec. 709, as the solver weighs colours. @type {Vec3} */
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 
@@ -29,6 +31,7 @@ export class Readings {
     #open = null;
     #next = 1;
     #reading = false;
+    #again = false;
     #hovering = false;
 
     /**
@@ -97,27 +100,35 @@ export class Readings {
         for (const { pick, mark } of this.#all) {
             const at = this.#camera.project(pick.point);
             mark.hidden = at === null || Math.abs(at[0]) > 1 || Math.abs(at[1]) > 1;
-            if (at) mark.style.transform = `translate(${(at[0] + 1) * 0.5 * width}px, ${(1 - at[1]) * 0.5 * height}px)`;
+            if (!at) continue;
+            const [x, y] = [(at[0] + 1) * 0.5 * width, (1 - at[1]) * 0.5 * height];
+            mark.style.transform = `translate(${x}px, ${y}px)`;
+            mark.dataset.flip = String(x > width - EDGE);
         }
     }
 
-    /** Reads again those that are in sight, in the light as it is now. */
+    /** Reads again those that are in sight, in the light as it is now, and dims those that something hides. */
     async refresh() {
-        if (this.#reading) return;
+        if (this.#reading) {
+            this.#again = true;
+            return;
+        }
         this.#reading = true;
         try {
             for (const reading of [...this.#all]) {
                 const at = this.#camera.project(reading.pick.point);
                 if (!at || Math.abs(at[0]) > 1 || Math.abs(at[1]) > 1) continue;
+                const before = this.#camera.pose;
                 const [x, y] = [
                     (at[0] + 1) * 0.5 * this.#canvas.clientWidth,
                     (1 - at[1]) * 0.5 * this.#canvas.clientHeight,
                 ];
                 const pick = await this.#picker(x, y);
-                // Something else may be in front of the point by now.
-                const near = 0.01 * length(sub(reading.pick.point, this.#camera.pose.eye));
-                if (!pick || pick.cell !== reading.pick.cell || length(sub(pick.point, reading.pick.point)) > near)
-                    continue;
+                // An answer that comes when the camera is elsewhere is one about another point.
+                if (this.#camera.pose !== before) continue;
+                const far = length(sub(reading.pick.point, before.eye));
+                reading.mark.dataset.behind = String(pick !== null && pick.distance < 0.99 * far);
+                if (!pick || pick.cell !== reading.pick.cell || Math.abs(pick.distance - far) > 0.01 * far) continue;
                 const { point, distance, radiance } = reading.pick;
                 // Radiance towards the eye is that of where it was read, unless the eye is still there.
                 const moved = length(sub(this.#camera.pose.eye, reading.eye)) > 0;
@@ -128,6 +139,20 @@ export class Readings {
         } finally {
             this.#reading = false;
         }
+        if (this.#again) {
+            this.#again = false;
+            await this.refresh();
+        }
+    }
+
+    /** The marks that can be seen, for a picture that is saved: pixels and words. */
+    get marks() {
+        return this.#all
+            .filter(({ mark }) => !mark.hidden && mark.dataset.behind !== "true")
+            .map(({ pick }) => {
+                const [x, y] = this.#camera.project(pick.point) ?? [NaN, NaN];
+                return { x: (x + 1) / 2, y: (1 - y) / 2, text: this.#illuminance(pick) };
+            });
     }
 
     /** Removes the reading whose card is open; whether there was one. */
@@ -173,7 +198,13 @@ export class Readings {
         for (const { mark } of this.#all) mark.setAttribute("aria-current", String(mark === reading?.mark));
         element("reading").hidden = reading === null;
         document.body.dataset.reading = reading ? "open" : "closed";
-        if (reading) this.#fill(reading);
+        if (!reading) return;
+        this.#fill(reading);
+        // The card keeps clear of the point that it is about: at the other end where it is as wide as the picture, else beside.
+        const at = this.#camera.project(reading.pick.point) ?? [0, 0];
+        const corner = (at[0] + 1) * this.#canvas.clientWidth < 640 && (1 - at[1]) * this.#canvas.clientHeight < 480;
+        document.body.dataset.readingSide = at[1] < 0 ? "top" : "bottom";
+        document.body.dataset.readingEdge = corner ? "right" : "left";
     }
 
     /** @param {Reading} reading */
@@ -185,7 +216,7 @@ export class Readings {
     /** @param {Reading} reading */
     #fill({ number: index, pick }) {
         const { name, factor } = this.#walk.unit;
-        element("reading-title").textContent = `Reading ${index}: ${this.#name()}`;
+        element("reading-title").textContent = `Reading ${index}`;
         element("reading-value").textContent = this.#illuminance(pick);
         element("reading-error").textContent = plusMinus(pick.error);
         element("reading-material").textContent = pick.material;

@@ -72,6 +72,8 @@ export class Renderer {
     #updates = 0;
     #slow = false;
     #lastFrame = 0;
+    /** Whether the next frame was asked for by this one. */
+    #follows = false;
     /** @type {number[]} */
     #range = [0, 1];
     #hasLight = false;
@@ -263,10 +265,10 @@ export class Renderer {
     #draw(time) {
         this.#requested = 0;
         if (!this.#view || !this.frame || !this.#hasLight) return;
-        const passed = time - this.#lastFrame;
-        this.#lastFrame = time;
         // Frames that follow each other tell how fast they are.
-        if (passed < 1000 && this.#frames + Number(this.#moving) > 0) this.#slow = passed > SLOW;
+        if (this.#follows) this.#slow = time - this.#lastFrame > SLOW;
+        this.#follows = false;
+        this.#lastFrame = time;
         const moving = this.#moving;
         this.#moving = false;
         // One frame after the last move the view rests, and the mean begins.
@@ -289,14 +291,18 @@ export class Renderer {
                     uKnownMean: from.textures[0],
                     uSampledMean: from.textures[1],
                 },
-                uShare: [share, share],
+                // A light that is finished has no samples; what they have shown of this view stays.
+                uShare: [share, this.resources.light.hasSamples || this.#frames === 1 ? share : 0],
             });
         }
         const settled = this.#meter(moving);
         this.#coarse = coarse;
         this.#show();
         this.onframe({ exposure: this.exposure, samples: this.#frames, illuminanceRange: this.#range });
-        if (coarse < 1 || !settled || this.#frames < (this.#slow ? FEW_FRAMES : FRAMES)) this.#request();
+        if (coarse < 1 || !settled || this.#frames < (this.#slow ? FEW_FRAMES : FRAMES)) {
+            this.#follows = true;
+            this.#request();
+        }
     }
 
     #coarse = 1;
@@ -399,7 +405,7 @@ export class Renderer {
             /** @type {Record<string, WebGLTexture|null>} */
             const textures = {};
             names.forEach((name, k) => (textures[name] = batch.textures[k] ?? (k === 3 ? this.flat : this.white)));
-            set(gl, program, { textures });
+            set(gl, program, { textures, uHas: batch.textures.map((texture) => (texture ? 1 : 0)) });
             gl.drawArrays(gl.TRIANGLES, 3 * batch.start, 3 * batch.count);
         }
         gl.bindVertexArray(null);
@@ -563,6 +569,7 @@ function set(gl, program, values) {
         else if (type === gl.FLOAT_VEC2) gl.uniform2fv(place, value);
         else if (type === gl.FLOAT_VEC3) gl.uniform3fv(place, value);
         else if (type === gl.FLOAT_VEC4) gl.uniform4fv(place, value);
+        else if (type === gl.BOOL_VEC4) gl.uniform4iv(place, value);
         else if (type === gl.FLOAT_MAT3) gl.uniformMatrix3fv(place, false, value);
         else if (type === gl.FLOAT_MAT4) gl.uniformMatrix4fv(place, false, value);
         else gl.uniform1i(place, value);

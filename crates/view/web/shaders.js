@@ -125,12 +125,14 @@ uniform vec3 uEye;
 uniform vec4 uScales; /* irradiance, radiance, samples, exposure */
 uniform int uGlossySlots, uMode; /* 0 radiance, 1 illuminance */
 uniform bool uCells, uSampled;
+uniform bvec4 uHas; /* textures: base colour, emission, metalness and roughness, normals */
 uniform vec3 uSeed;
 layout(location = 0) out vec4 oKnown;
 layout(location = 1) out vec4 oSampled;
 
 const float PI = 3.141592653589793;
 const float BRIGHTEST = 12.0;
+const float FIREFLY = 8.0;
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 float random(vec3 p) {
     uvec3 q = uvec3(floatBitsToUint(p.x), floatBitsToUint(p.y), floatBitsToUint(p.z)) * uvec3(1664525u, 22695477u, 1103515245u);
@@ -138,7 +140,8 @@ float random(vec3 p) {
     h ^= h >> 16; h *= 0x7feb352du; h ^= h >> 15; h *= 0x846ca68bu; h ^= h >> 16;
     return float(h >> 8) / 16777216.0;
 }
-vec4 material(int k) { return texelFetch(uMaterials, at(int(texelFetch(uTriangles, at(2 * int(vTriangle)), 0).w & 0xffffu) * ${MATERIAL_TEXELS} + k), 0); }
+int materialStart;
+vec4 material(int k) { return texelFetch(uMaterials, at(materialStart + k), 0); }
 vec2 transformed(int k) {
     vec4 matrix = material(k), offset = material(k + 1);
     vec2 uv = offset.z > 0.5 ? vTexcoords.zw : vTexcoords.xy;
@@ -193,16 +196,17 @@ vec3 lobe(Look l, vec3 n, vec3 wi, vec3 wo) {
    of half vectors, whose mirror directions spread 2 cosθ times as far (Wang et al., SIGGRAPH Asia 2009). */
 vec2 shrink(Look l, float co) {
     float sharp = l.kind == 2 ? max(l.exponent, 0.5) : 1.0 / (2.0 * l.alpha * l.alpha * max(co, 0.2));
-    return exp(-vec2(2.0, 6.0) / (2.0 * sharp));
+    return vec2(0.92, 0.75) * exp(-vec2(2.0, 6.0) / (2.0 * sharp));
 }
 
 void main() {
     int triangle = int(vTriangle);
     uvec4 record = texelFetch(uTriangles, at(2 * triangle), 0), more = texelFetch(uTriangles, at(2 * triangle + 1), 0);
+    materialStart = int(record.w & 0xffffu) * ${MATERIAL_TEXELS};
     bool front = gl_FrontFacing;
     uint first = front ? record.y : record.z;
     vec4 base = material(0), glow = material(1), m2 = material(2), m3 = material(3), m4 = material(4);
-    vec4 texel = texture(uBase, transformed(6));
+    vec4 texel = uHas.x ? texture(uBase, transformed(6)) : vec4(1.0);
     vec3 color = base.rgb * texel.rgb;
     float alpha = base.a * texel.a;
     if (m4.x >= 0.0 && alpha < m4.x) discard;
@@ -231,7 +235,7 @@ void main() {
         return;
     }
 
-    vec3 metal = texture(uMetal, transformed(10)).rgb;
+    vec3 metal = uHas.z ? texture(uMetal, transformed(10)).rgb : vec3(1.0);
     Look l;
     l.kind = int(glow.a);
     float metallic = clamp(m2.x * metal.b, 0.0, 1.0);
@@ -259,30 +263,27 @@ void main() {
     vec3 sampled = vec3(0.0);
 
     if (l.glossy && int(first) < uGlossySlots) {
-        if (material(13).w > 0.5) n = bumped(n, transformed(12), m4.w);
+        if (uHas.w) n = bumped(n, transformed(12), m4.w);
         vec3 albedo = lobeAlbedo(l, s);
         vec3 r = reflect(-wo, n);
         vec2 k = shrink(l, co);
-        /* Radiance from around the mirror direction. */
-        float y[8] = float[8](
-            0.4886025 * r.y, 0.4886025 * r.z, 0.4886025 * r.x, 1.0925484 * r.x * r.y, 1.0925484 * r.y * r.z,
-            0.3153916 * (3.0 * r.z * r.z - 1.0), 1.0925484 * r.x * r.z, 0.5462742 * (r.x * r.x - r.y * r.y));
+        /* Radiance from around the mirror direction. Few harmonics swing below zero beside what is bright; the kernel
+           ((1 + cos)/2)² of degree 2 does not, and what it sees is never all dark. */
+        vec3 y1 = 0.8462844 * vec3(r.y, r.z, r.x);
+        vec3 y2a = 2.4430126 * vec3(r.x * r.y, r.y * r.z, 0.2886751 * (3.0 * r.z * r.z - 1.0));
+        vec2 y2b = 2.4430126 * vec2(r.x * r.z, 0.5 * (r.x * r.x - r.y * r.y));
         vec3 radiance = vec3(0.0);
         for (int c = 0; c < 4; c++) {
             if (around.weights[c] == 0.0) continue;
             int slot = int(first) + around.slots[c];
             vec3 even = texelFetch(uRadiance, at(slot), 0).rgb;
-            vec3 shape = vec3(0.2820948);
-            float bytes[24];
-            for (int t = 0; t < 6; t++) {
-                vec4 b = texelFetch(uDirections, at(6 * slot + t), 0);
-                bytes[4 * t] = b.x; bytes[4 * t + 1] = b.y; bytes[4 * t + 2] = b.z; bytes[4 * t + 3] = b.w;
-            }
-            for (int q = 0; q < 8; q++) {
-                float factor = y[q] * (q < 3 ? 1.7320508 * k.x : 2.2360680 * k.y);
-                shape += factor * vec3(bytes[3 * q], bytes[3 * q + 1], bytes[3 * q + 2]);
-            }
-            radiance += around.weights[c] * even * max(shape, 0.0);
+            vec4 b0 = texelFetch(uDirections, at(6 * slot), 0), b1 = texelFetch(uDirections, at(6 * slot + 1), 0);
+            vec4 b2 = texelFetch(uDirections, at(6 * slot + 2), 0), b3 = texelFetch(uDirections, at(6 * slot + 3), 0);
+            vec4 b4 = texelFetch(uDirections, at(6 * slot + 4), 0), b5 = texelFetch(uDirections, at(6 * slot + 5), 0);
+            vec3 first3 = y1.x * b0.xyz + y1.y * vec3(b0.w, b1.xy) + y1.z * vec3(b1.zw, b2.x);
+            vec3 last5 = y2a.x * b2.yzw + y2a.y * b3.xyz + y2a.z * vec3(b3.w, b4.xy) + y2b.x * vec3(b4.zw, b5.x) + y2b.y * b5.yzw;
+            vec3 sharp = 0.2820948 + k.x * first3 + k.y * last5, blunt = 0.2820948 + 0.5 * first3 + 0.1 * last5;
+            radiance += around.weights[c] * even * max(sharp, 0.3 * max(blunt, 0.0));
         }
         known += albedo * radiance * uScales.y;
 
@@ -304,11 +305,13 @@ void main() {
                 float a = dot(wi, r), b = dot(below, r);
                 float part = (2.0 + 3.0 * k.x * (a + b) + 5.0 * k.y * (1.5 * (a * a + b * b) - 1.0)) / (4.0 * PI);
                 sampled = brought * (lobe(l, n, wi, wo) - albedo * max(part, 0.0) / max(dot(n, wi), 0.1));
+                /* Rare bright ones would stay as dots for hundreds of updates. */
+                sampled *= min(1.0, FIREFLY * luminance(known) / max(abs(luminance(sampled)), 1e-30));
             }
         }
     }
     bool lit = luminance(known) > 0.0;
-    vec3 emitted = front ? glow.rgb * texture(uEmission, transformed(8)).rgb : vec3(0.0);
+    vec3 emitted = front ? glow.rgb * (uHas.y ? texture(uEmission, transformed(8)).rgb : vec3(1.0)) : vec3(0.0);
     bool emits = luminance(emitted) > 0.0;
     emitted *= uScales.w;
     emitted *= min(1.0, BRIGHTEST / max(max(emitted.r, emitted.g), max(emitted.b, 1e-20)));

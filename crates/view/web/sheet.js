@@ -4,7 +4,8 @@
 
 import { element } from "twinray/announce.js";
 
-const NARROW = "(width < 760px)";
+/** As in `style.css`. */
+const NARROW = "(width < 760px) and (orientation: portrait), (width < 500px)";
 /** A swipe of the sheet's head, in pixels. */
 const SWIPE = 24;
 
@@ -18,6 +19,8 @@ export function setUpSheet() {
         if (Math.abs(up) > SWIPE && matchMedia(NARROW).matches) setSheet(up > 0);
     });
     setSheet(false);
+    // A telephone on its side: half of so small a picture is too much for a panel that nobody asked for.
+    if (matchMedia("(width < 760px)").matches && !matchMedia(NARROW).matches) togglePanel();
 }
 
 /** Shows or hides the controls, in the way of this window. */

@@ -3,36 +3,15 @@
  * Keys that move while they are held are those of `controls.js`; their words stand here too.
  */
 
-import { element } from "twinray/announce.js";
+import { element, toast } from "twinray/announce.js";
 import { keyIsTaken } from "twinray/controls.js";
 
+/** @import { Actions } from "twinray/actions.js" */
+/** @import { Mode } from "twinray/types.js" */
 /** @typedef {{ keys: string[], shown?: string[], says: string, run: (event: KeyboardEvent) => void }} Shortcut */
 /** @typedef {{ title: string, rows: [string[], string][] }} HelpGroup */
 
-/**
- * What shortcuts can do; `main.js` says how.
- * @typedef {object} Actions
- * @property {() => void} home
- * @property {(index: number) => void} camera
- * @property {() => void} mode
- * @property {(steps: number) => void} fov
- * @property {(steps: number) => void} speed
- * @property {(stops: number) => void} exposure
- * @property {() => void} autoExposure
- * @property {() => void} curve
- * @property {() => void} falseColour
- * @property {() => void} scale
- * @property {() => void} cells
- * @property {() => void} picking
- * @property {() => void} pickMiddle
- * @property {() => void} escape
- * @property {() => void} pause
- * @property {() => void} screenshot
- * @property {() => void} fullscreen
- * @property {() => void} link
- * @property {() => void} panel
- * @property {() => void} help
- */
+const WELCOME_MILLISECONDS = 6000;
 
 const MOVES = /** @type {HelpGroup} */ ({
     title: "Movement",
@@ -69,6 +48,7 @@ function table(act) {
             title: "View",
             shortcuts: [
                 key(["h"], "Home", act.home),
+                key(["z"], "The whole scene from outside", act.overview),
                 key([..."123456789"], "Camera of the scene", (event) => act.camera(Number(event.key) - 1), [
                     "1",
                     "…",
@@ -98,7 +78,7 @@ function table(act) {
                 key(["k"], "Logarithmic or linear scale", act.scale),
                 key(["c"], "Cells", act.cells),
                 key(["r"], "Take readings", act.picking),
-                key(["Enter"], "Reading in the middle", act.pickMiddle),
+                key(["Enter"], "Reading in the middle", act.pickMiddle, ["Enter"]),
             ],
         },
         {
@@ -137,9 +117,7 @@ export function setUpShortcuts(act) {
         rows: shortcuts.map(({ keys, shown, says }) => [shown ?? keys.map((key) => key.toUpperCase()), says]),
     }));
     element("help-body").append(
-        ...[MOVES, ...rows.slice(0, 2), GESTURES, ...rows.slice(2)].map((group) =>
-            section(/** @type {HelpGroup} */ (group)),
-        ),
+        ...[GESTURES, MOVES, ...rows].map((group) => section(/** @type {HelpGroup} */ (group))),
     );
 }
 
@@ -148,6 +126,14 @@ export function toggleHelp() {
     const dialog = /** @type {HTMLDialogElement} */ (element("help"));
     if (dialog.open) dialog.close();
     else dialog.showModal();
+}
+
+/** Says how to move, to someone who sees the page for the first time. @param {Mode} mode */
+export function welcome(mode) {
+    const drag = mode === "orbit" ? "Drag to orbit" : "Drag to look around";
+    const touch = matchMedia("(pointer: coarse)").matches;
+    const move = touch ? "pinch to come nearer, double-tap to focus" : "W A S D to move, ? for all keys";
+    toast(`${drag}, ${move}`, WELCOME_MILLISECONDS);
 }
 
 /** @param {HelpGroup} group */

@@ -38,7 +38,8 @@ export function format(walk, pose, distance, values) {
     const level = frameOf({ ...anglesOf(pose), roll: 0 }).up;
     if (dot(level, pose.up) < 1 - 1e-7 || Math.abs(pose.forward[1]) > 0.9999) parts.push(`up=${triple(pose.up, 6)}`);
     parts.push(`distance=${fixed(distance, decimals)}`, `fov=${fixed(pose.fov * DEGREES, 3)}`);
-    if (values.mode !== DEFAULTS.mode) parts.push(`mode=${values.mode}`);
+    // What one starts with depends on the scene, so that none is the default.
+    parts.push(`mode=${values.mode}`);
     if (values.speed !== DEFAULTS.speed) parts.push(`speed=${fixed(values.speed, 3)}`);
     if (values.exposure !== null) parts.push(`exposure=${fixed(values.exposure, 3)}`);
     if (values.curve !== DEFAULTS.curve) parts.push(`tone=${values.curve}`);

@@ -116,7 +116,7 @@ fn show(args: &ViewerArgs, loaded: &Loaded, sender: &mut Sender) -> anyhow::Resu
     let solution = stored_solution(&args.load.scene, loaded)?;
     sender.light(&solution, 1);
     sender.status("finished", solution.rays(), solution.relative_error(), Value::Null);
-    sender.light(&solution, FINISHED_ROUNDS - 1);
+    sender.finished(&solution);
     Ok(())
 }
 
@@ -159,7 +159,7 @@ fn solve(args: &ViewerArgs, loaded: &Loaded, sender: &mut Sender, output: Option
     }
     if !solved.interrupted {
         let solution = solver.solution();
-        sender.light(&solution, FINISHED_ROUNDS);
+        sender.finished(&solution);
         sender.status("finished", solver.rays(), solution.relative_error(), told);
     }
     Ok(())
@@ -216,6 +216,13 @@ impl<'a> Sender<'a> {
         let start = Instant::now();
         self.feed.rest(REST);
         self.rested += start.elapsed().as_secs_f64();
+    }
+
+    /// The light of a solution that is final. It has no samples: one of each cell is noise, which only many average.
+    fn finished(&mut self, solution: &Solution) {
+        let light = self.light.of(solution, FINISHED_ROUNDS);
+        let behind = Behind { rays: solution.rays(), error: solution.relative_error() };
+        self.feed.send_light(light::light(&light, &[], behind));
     }
 
     /// The light of a solution.
