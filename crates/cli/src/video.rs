@@ -104,8 +104,8 @@ impl Video {
         command.current_dir(folder).args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]);
         command.args(["-framerate", &fps.to_string(), "-start_number", &first.to_string(), "-i", "%08d.png"]);
         if self.kind.is_subsampled {
-            // Sides have to be even, and players take what says nothing for Rec. 709.
-            let filter = "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p";
+            // Sides have to be even: an odd one loses a row of pixels. Players take what says nothing for Rec. 709.
+            let filter = "crop=trunc(iw/2)*2:trunc(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p";
             command.args(["-vf", filter, "-colorspace", "bt709", "-color_primaries", "bt709"]);
             command.args(["-color_trc", "iec61966-2-1", "-color_range", "tv"]);
         }

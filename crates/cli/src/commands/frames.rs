@@ -54,8 +54,8 @@ pub(super) fn run(args: &RenderArgs, motion: &str) -> anyhow::Result<Ending> {
     let method = args.method();
     args.display.check(method, &frame_extension)?;
     super::render::check(args)?;
-    let numbered = if is_film { None } else { Some(Numbered::parse(&name)?) };
     let source = Source::new(motion)?;
+    let place = if is_film { Place::Film(Video::open(&name)?) } else { Place::Frames(Numbered::parse(&name)?) };
     let denoiser = display::denoiser(args)?;
     commands::set_threads(args.load.threads);
     interrupt::install();
@@ -66,14 +66,10 @@ pub(super) fn run(args: &RenderArgs, motion: &str) -> anyhow::Result<Ending> {
     let range = range(args.motion.frames, motion.count)?;
     let first_camera = motion.camera(args, &loaded, 0)?;
     let film = display::film(args, &first_camera)?;
-    let mut place = match numbered {
-        Some(numbered) => {
-            // Found writable before the long work starts.
-            drop(Output::open(&numbered.path(range.start))?);
-            Place::Frames(numbered)
-        }
-        None => Place::Film(Video::open(&name)?),
-    };
+    // Found writable before the long work starts.
+    if let Place::Frames(numbered) = &place {
+        drop(Output::open(&numbered.path(range.start))?);
+    }
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     if !args.load.quiet {
         crate::say!(
@@ -193,7 +189,7 @@ enum Place {
 
 impl Place {
     /// The file of a frame, and its way there; frames of a film are written straight into a folder that goes away.
-    fn open(&mut self, frame: usize) -> anyhow::Result<(PathBuf, Option<Output>)> {
+    fn open(&self, frame: usize) -> anyhow::Result<(PathBuf, Option<Output>)> {
         match self {
             Self::Frames(numbered) => {
                 let file = numbered.path(frame);
