@@ -31,7 +31,7 @@ fn files(report: &Value) -> Vec<&str> {
 fn frames_are_pictures() {
     for method in ["gather", "patches", "path"] {
         let tiny = &TINY[if method == "path" { 4 } else { 0 }..];
-        let tiny = &[&tiny[..], &["--exposure", "1.5", "--method", method]].concat();
+        let tiny = &[tiny, &["--exposure", "1.5", "--method", method]].concat();
         let (place, report) = walk(&[&tiny[..], &["-o", "f%02d.png"]].concat());
         assert_eq!(files(&report), ["f00.png", "f01.png", "f02.png"], "{method}");
         assert_eq!(report["frames"], json!({ "count": 3, "first": 0, "done": 3 }));

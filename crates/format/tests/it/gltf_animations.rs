@@ -106,7 +106,8 @@ fn what_does_not_move_is_named() {
 /// Light needs no animation: a fault in one costs that one.
 #[test]
 fn faults_cost_the_animation_alone() {
-    let cases: [(&str, fn(&mut Doc)); 5] = [
+    type Spoil = fn(&mut Doc);
+    let cases: [(&str, Spoil); 5] = [
         ("times that do not increase", |doc| {
             doc.json["animations"][0]["samplers"][0]["input"] = json!(doc.floats(&[[1.0], [1.0]]));
         }),
