@@ -247,12 +247,12 @@ mod films {
         // What the stand-in itself calls is where it always is, and no ffmpeg of this machine is.
         command.current_dir(place.path("")).env("PATH", place.path("bin"));
         if place.path("bin/ffmpeg").exists() {
-            for tool in ["ls", "mv"] {
+            for program in ["ls", "mv"] {
                 let real = ["/bin", "/usr/bin"]
                     .iter()
-                    .map(|d| format!("{d}/{tool}"))
+                    .map(|d| format!("{d}/{program}"))
                     .find(|p| std::path::Path::new(p).exists());
-                let _ = std::os::unix::fs::symlink(real.unwrap(), place.path(&format!("bin/{tool}")));
+                let _ = std::os::unix::fs::symlink(real.unwrap(), place.path(&format!("bin/{program}")));
             }
         }
         let output = command.output().unwrap();
