@@ -126,7 +126,7 @@ impl Unit {
 }
 
 /// A camera of the command line.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub struct ViewArgs {
     /// Camera of the scene, by name or index [default: 0]
     #[arg(long, value_name = "NAME|INDEX")]
@@ -230,7 +230,11 @@ pub struct RenderArgs {
     /// Solver.
     #[command(flatten)]
     pub solve: SolveArgs,
-    /// Picture to write: .png, or .exr for linear radiance [default: SCENE.png in this folder]
+    /// Frames along a path.
+    #[command(flatten)]
+    pub motion: MotionArgs,
+    /// Picture to write: .png, or .exr for linear radiance [default: SCENE.png in this folder]; with --path a picture for each
+    /// frame, such as frames/%04d.png [default: SCENE-%04d.png], or a film, .mp4, .webm or .webp, where ffmpeg is installed
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Size of the picture in pixels [default: 512 high, as wide as the camera asks]
@@ -246,6 +250,25 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub display: DisplayArgs,
 }
+
+/// A camera that moves.
+#[derive(Debug, clap::Args)]
+pub struct MotionArgs {
+    /// Frames along a path, all of the same solution: a file of keys (docs/pictures.md tells its form), or an animation of a
+    /// camera in a glTF file, the first that moves the camera or the one of that name
+    #[arg(long, value_name = "KEYS.json|animation[:NAME]", conflicts_with_all = ["eye", "target", "time"])]
+    pub path: Option<String>,
+    /// Frames per second of the path [default: what the keys say, else 24]
+    #[arg(long, value_name = "N", value_parser = fps, requires = "path", allow_negative_numbers = true)]
+    pub fps: Option<f64>,
+    /// Only the frames from A on and before B, counted from 0: a part, or to go on after an interruption; either may be left out
+    #[arg(long, value_name = "A..B", value_parser = frames, requires = "path", allow_hyphen_values = true)]
+    pub frames: Option<FrameRange>,
+}
+
+/// Frames from the first on and before the second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRange(pub usize, pub Option<usize>);
 
 /// How a picture is made.
 #[derive(Debug, clap::Args)]
@@ -576,6 +599,23 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
     if triple.iter().all(|x| x.is_finite()) { Ok(triple) } else { Err(expected.into()) }
 }
 
+/// A frame rate that may be written as 30000/1001.
+fn fps(text: &str) -> Result<f64, String> {
+    let (over, under) = text.split_once('/').unwrap_or((text, "1"));
+    let rate = over.trim().parse::<f64>().ok().zip(under.trim().parse::<f64>().ok()).map(|(a, b)| a / b);
+    let rate = rate.filter(|r| (1e-3..=1000.0).contains(r));
+    rate.ok_or_else(|| "expected frames per second such as 24 or 30000/1001, from 0.001 to 1000".into())
+}
+
+fn frames(text: &str) -> Result<FrameRange, String> {
+    let expected = "expected A..B with A less than B, such as 0..48, 24.. or ..48";
+    let (from, to) = text.split_once("..").ok_or(expected)?;
+    let number = |text: &str| text.trim().parse::<usize>().map_err(|_| expected);
+    let from = if from.trim().is_empty() { 0 } else { number(from)? };
+    let to = if to.trim().is_empty() { None } else { Some(number(to)?) };
+    if to.is_some_and(|to| to <= from) { Err(expected.into()) } else { Ok(FrameRange(from, to)) }
+}
+
 fn size(text: &str) -> Result<(u32, u32), String> {
     let expected = "expected WIDTHxHEIGHT in pixels, such as 800x600, each 1 to 16384";
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or(expected)?;
@@ -615,5 +655,11 @@ mod tests {
         assert_eq!(part("3/16"), Ok([3, 16]));
         assert!(["0/4", "5/4", "4", "a/b", "-1/2"].iter().all(|text| part(text).is_err()));
         assert!(triple("1,2").is_err() && triple("1,2,nan").is_err());
+        assert_eq!(fps("24"), Ok(24.0));
+        assert!((fps("30000/1001").unwrap() - 29.97).abs() < 1e-3);
+        assert!(["0", "-1", "nan", "1/0", "", "a/2"].iter().all(|text| fps(text).is_err()));
+        assert_eq!(frames("3..8"), Ok(FrameRange(3, Some(8))));
+        assert_eq!((frames("3.."), frames("..8")), (Ok(FrameRange(3, None)), Ok(FrameRange(0, Some(8)))));
+        assert!(["3", "8..3", "3..3", "-1..3", "a..b", "1...3"].iter().all(|text| frames(text).is_err()));
     }
 }

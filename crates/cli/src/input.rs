@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use twinray::format::{self, Limits, PictureFile, SceneSource};
 use twinray::scene::complete::complete;
-use twinray::scene::{Camera, PatchBudget, PatchOptions, PatchScene, Projection, Scene, builtin};
+use twinray::scene::{Camera, CameraAnimation, PatchBudget, PatchOptions, PatchScene, Projection, Scene, builtin};
 
 use crate::args::{LoadArgs, ReadArgs, ViewArgs};
 use crate::estimate::{self, Expected, Work};
@@ -16,6 +16,9 @@ use crate::stored::{self, Stored};
 /// Patches where neither the user nor the scene says how many.
 const DEFAULT_PATCHES: usize = 100_000;
 
+/// Name of the camera that options describe.
+const COMMAND_LINE: &str = "command line";
+
 /// A scene ready to be solved.
 #[derive(Debug)]
 pub struct Loaded {
@@ -23,8 +26,12 @@ pub struct Loaded {
     pub name: String,
     /// Its patches.
     pub patches: PatchScene,
-    /// Cameras of the file, or the one that was chosen.
+    /// Cameras of the file; before them, the one that was chosen.
     pub cameras: Vec<Camera>,
+    /// Whether the first of them is not the file's.
+    is_chosen: bool,
+    /// How cameras of the file move.
+    pub animations: Vec<CameraAnimation>,
     /// What was ignored or added, one line each.
     pub warnings: Vec<String>,
     /// What was expected before the start.
@@ -38,6 +45,16 @@ pub struct Loaded {
 }
 
 impl Loaded {
+    /// Cameras of the file alone.
+    pub fn scene_cameras(&self) -> &[Camera] {
+        &self.cameras[usize::from(self.is_chosen)..]
+    }
+
+    /// The camera that options describe, if they do; otherwise the file's of that name or index, or its first.
+    pub fn camera(&self, wish: Option<&str>) -> anyhow::Result<&Camera> {
+        pick_camera(&self.cameras, wish.filter(|_| !self.is_chosen))
+    }
+
     /// The scene's unit of length.
     pub fn metres_per_unit(&self) -> f64 {
         self.source.metres_per_unit
@@ -163,7 +180,7 @@ fn cut(
     scale(&mut scene, source.metres_per_unit);
     let lit = light.apply(&mut scene, &limits(&args.read))?;
     warnings.extend(lit.into_iter().map(|w| format!("{}: {w}", source.file)));
-    let wanted = view.map(|v| override_camera(&scene, v, source.metres_per_unit)).transpose()?.flatten();
+    let wanted = view.map(|v| override_camera(&scene.cameras, v, source.metres_per_unit)).transpose()?.flatten();
     let name = source.file.as_str();
     let budget = match (source.patches, source.patch_size) {
         (Some(n), _) => PatchBudget::Count(n as usize),
@@ -192,10 +209,21 @@ fn cut(
             .push(format!("{name}: {count} triangles left out, as they have no area or no finite place in the scene"));
     }
     let mut cameras = scene.cameras;
-    if let Some(camera) = wanted {
-        cameras.insert(0, camera);
-    }
-    Ok(Loaded { name: scene.name, patches, cameras, warnings, expected, stored: None, source, light })
+    let is_chosen = wanted.is_some();
+    cameras.splice(0..0, wanted);
+    let animations = scene.animations;
+    Ok(Loaded {
+        name: scene.name,
+        patches,
+        cameras,
+        is_chosen,
+        animations,
+        warnings,
+        expected,
+        stored: None,
+        source,
+        light,
+    })
 }
 
 /// Lengths of the file to metres.
@@ -213,6 +241,7 @@ fn scale(scene: &mut Scene, metres: f64) {
     for light in &mut scene.lights {
         light.transform.translation *= metres;
     }
+    scene.animations.iter_mut().for_each(|animation| animation.scale_lengths(metres));
     for camera in &mut scene.cameras {
         camera.eye *= metres;
         if let Projection::Orthographic { half_height } = &mut camera.projection {
@@ -222,16 +251,16 @@ fn scale(scene: &mut Scene, metres: f64) {
 }
 
 /// The camera that `--eye` and its kin describe, starting from the scene's own; `None` without any of them.
-fn override_camera(scene: &Scene, view: &ViewArgs, metres: f64) -> anyhow::Result<Option<Camera>> {
+pub fn override_camera(cameras: &[Camera], view: &ViewArgs, metres: f64) -> anyhow::Result<Option<Camera>> {
     if view.eye.is_none() && view.target.is_none() && view.up.is_none() && view.fov.is_none() {
         return Ok(None);
     }
-    let base = match (scene.cameras.is_empty(), view.eye.is_some() && view.target.is_some()) {
-        (false, _) => pick_camera(&scene.cameras, view.camera.as_deref())?.clone(),
-        (true, true) => Camera::look_at("command line", Vector::ZERO, Vector::ZERO, Vector::Y, 50.0),
+    let base = match (cameras.is_empty(), view.eye.is_some() && view.target.is_some()) {
+        (false, _) => pick_camera(cameras, view.camera.as_deref())?.clone(),
+        (true, true) => Camera::look_at(COMMAND_LINE, Vector::ZERO, Vector::ZERO, Vector::Y, 50.0),
         (true, false) => bail!("the scene has no camera to change; give both --eye and --target"),
     };
-    let mut camera = Camera { name: "command line".into(), ..base };
+    let mut camera = Camera { name: COMMAND_LINE.into(), ..base };
     let target = view.target.map(|t| vector(t) * metres);
     if let Some(eye) = view.eye {
         camera.eye = vector(eye) * metres;

@@ -27,13 +27,17 @@ mod failure;
 mod files;
 mod input;
 mod interrupt;
+mod keyframes;
 mod light_args;
 mod lights;
 mod memory;
+mod motion;
+mod numbered;
 mod output;
 mod progress;
 mod settings;
 mod stored;
+mod video;
 
 use anyhow::bail;
 use clap::Parser;

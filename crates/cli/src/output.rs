@@ -99,10 +99,54 @@ impl Drop for Output {
     }
 }
 
+/// A folder beside the place of a file, for what the file is made of. Removed at the end.
+#[derive(Debug)]
+pub struct BesideFolder {
+    path: PathBuf,
+    is_kept: bool,
+}
+
+impl BesideFolder {
+    /// Makes the folder for a file that is open, which keeps other programs out of it. What a killed program left there is removed.
+    pub fn of(output: &Output) -> anyhow::Result<Self> {
+        let mut name = output.beside.clone().into_os_string();
+        name.push(".frames");
+        let path = PathBuf::from(name);
+        let made = match std::fs::remove_dir_all(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => std::fs::create_dir(&path),
+        };
+        made.with_context(|| format!("{}: cannot make the folder {}", output.name, path.display()))?;
+        BESIDE.lock().unwrap_or_else(|e| e.into_inner()).push(path.clone());
+        Ok(Self { path, is_kept: false })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Leaves it there.
+    pub fn keep(&mut self) {
+        self.is_kept = true;
+    }
+}
+
+impl Drop for BesideFolder {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            let _ = std::fs::remove_dir_all(&self.path);
+        }
+        BESIDE.lock().unwrap_or_else(|e| e.into_inner()).retain(|path| *path != self.path);
+    }
+}
+
 /// Removes what is written beside its place: for a program that ends at once.
 pub fn abandon() {
     if let Ok(paths) = BESIDE.try_lock() {
-        paths.iter().for_each(|path| drop(std::fs::remove_file(path)));
+        for path in paths.iter() {
+            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+        }
     }
 }
 

@@ -43,15 +43,7 @@ enum Shown {
 impl Progress {
     /// Starts the clock.
     pub fn new(goal: Goal, quiet: bool) -> Self {
-        let shown = if quiet {
-            Shown::Nothing
-        } else if std::io::stderr().is_terminal() {
-            let bar = ProgressBar::new(1000);
-            bar.set_style(ProgressStyle::with_template("{bar:30} {percent:>3}%  {msg}").expect("a fixed template"));
-            Shown::Bar(bar)
-        } else {
-            Shown::Lines
-        };
+        let shown = Shown::new(quiet);
         Self { start: Instant::now(), goal, unit: "rays", before: 0, shown, last_line: 0.0 }
     }
 
@@ -114,14 +106,7 @@ impl Progress {
             100.0 * relative_error,
             HumanDuration(Duration::from_secs_f64(left.min(1e9)))
         );
-        match &self.shown {
-            Shown::Nothing => {}
-            Shown::Lines => crate::say!("{:3.0} %  {message}", 100.0 * share.min(1.0)),
-            Shown::Bar(bar) => {
-                bar.set_position((1000.0 * share.min(1.0)) as u64);
-                bar.set_message(message);
-            }
-        }
+        self.shown.tell(share, message);
         self.last_line = seconds;
     }
 
@@ -135,8 +120,86 @@ impl Progress {
 
     /// Takes the bar away.
     pub fn finish(&self) {
-        if let Shown::Bar(bar) = &self.shown {
+        self.shown.finish();
+    }
+}
+
+impl Shown {
+    fn new(quiet: bool) -> Self {
+        if quiet {
+            Self::Nothing
+        } else if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(1000);
+            bar.set_style(ProgressStyle::with_template("{bar:30} {percent:>3}%  {msg}").expect("a fixed template"));
+            Self::Bar(bar)
+        } else {
+            Self::Lines
+        }
+    }
+
+    fn tell(&self, share: f64, message: String) {
+        match self {
+            Self::Nothing => {}
+            Self::Lines => crate::say!("{:3.0} %  {message}", 100.0 * share.min(1.0)),
+            Self::Bar(bar) => {
+                bar.set_position((1000.0 * share.min(1.0)) as u64);
+                bar.set_message(message);
+            }
+        }
+    }
+
+    fn finish(&self) {
+        if let Self::Bar(bar) = self {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Progress of many pictures.
+#[derive(Debug)]
+pub struct FrameProgress {
+    start: Instant,
+    total: usize,
+    done: usize,
+    shown: Shown,
+    last_line: f64,
+}
+
+impl FrameProgress {
+    /// Starts the clock for so many pictures.
+    pub fn new(total: usize, quiet: bool) -> Self {
+        Self { start: Instant::now(), total, done: 0, shown: Shown::new(quiet), last_line: 0.0 }
+    }
+
+    /// One more is done.
+    pub fn advance(&mut self) {
+        self.done += 1;
+        self.update(0.0);
+    }
+
+    /// Tells how much of the next one is done.
+    pub fn update(&mut self, share_of_next: f64) {
+        let seconds = self.seconds();
+        if matches!(self.shown, Shown::Nothing) || self.done >= self.total {
+            return;
+        }
+        if matches!(self.shown, Shown::Lines) && seconds - self.last_line < LINE_INTERVAL {
+            return;
+        }
+        let share = (self.done as f64 + share_of_next.clamp(0.0, 1.0)) / self.total as f64;
+        let left = seconds * (1.0 / share.max(1e-9) - 1.0);
+        let left = HumanDuration(Duration::from_secs_f64(left.min(1e9)));
+        self.shown.tell(share, format!("frame {} of {}  {left} left", self.done + 1, self.total));
+        self.last_line = seconds;
+    }
+
+    /// Seconds since the start.
+    pub fn seconds(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.shown.finish();
     }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
+use crate::animation::CameraAnimation;
 use crate::camera::Camera;
 use crate::rgb::Rgb;
 
@@ -25,6 +26,8 @@ pub struct Scene {
     pub images: Vec<Arc<TextureImage>>,
     /// Cameras in file order; may be empty.
     pub cameras: Vec<Camera>,
+    /// How cameras move, in file order; may be empty. Light knows nothing of it.
+    pub animations: Vec<CameraAnimation>,
     /// Light that comes from infinitely far away; `None` is black.
     pub environment: Option<Environment>,
     /// Lights without area.

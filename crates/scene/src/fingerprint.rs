@@ -196,6 +196,7 @@ mod tests {
     use glam::{DAffine3, DVec3};
 
     use super::*;
+    use crate::animation::{CameraAnimation, Joint};
     use crate::authored::{
         EnvironmentMap, LightKind, LightProfile, PunctualLight, RadianceMap, Scene, Sky, Texel, TextureRef,
     };
@@ -281,6 +282,10 @@ mod tests {
             s.materials.iter_mut().for_each(|m| m.name = "x".into());
         });
         hides("cameras", &base, |s| s.cameras.clear());
+        hides("motion of cameras", &base, |s| {
+            let joints = vec![Joint::Fixed(DAffine3::from_translation(DVec3::X))];
+            s.animations.push(CameraAnimation { name: "fly".into(), camera: 0, joints });
+        });
         hides("the order of materials", &base, |s| {
             s.materials.swap(0, 1);
             s.meshes.iter_mut().filter(|m| m.material < 2).for_each(|m| m.material = 1 - m.material);

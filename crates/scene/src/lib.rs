@@ -1,10 +1,12 @@
 //! What light meets: colour, geometry, materials, patches, cameras and the built-in scenes.
+pub mod animation;
 pub mod authored;
 pub mod brdf;
 pub mod builtin;
 mod bumps;
 mod bvh;
 pub mod camera;
+pub mod camera_path;
 pub mod cells;
 pub mod complete;
 pub mod environment;
@@ -23,6 +25,7 @@ mod surface;
 pub mod texture;
 pub mod validate;
 
+pub use animation::{CameraAnimation, Interpolation, Joint, MovingJoint, Track};
 pub use authored::{
     Environment, EnvironmentMap, Instance, LightKind, LightProfile, Material, Mesh, NormalMap, Opacity, PunctualLight,
     RadianceMap, Scene, Sky, SkyLevel, SkyModel, Surface, Texel, TextureImage, TextureRef, TextureTransform,
@@ -31,6 +34,7 @@ pub use authored::{
 pub use bvh::SurfaceHit;
 pub use camera::{Camera, Lens, Projection};
 pub use cells::Cells;
+pub use camera_path::{CameraKey, CameraPath};
 pub use estimate::{Estimate, estimate};
 pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
 pub use punctual::PointLight;

@@ -8,7 +8,7 @@ use twinray::render::{Aovs, Gather, GatherOptions};
 use twinray::scene::Camera;
 
 use super::path::MOST_LAYER_SAMPLES;
-use super::render::{Light, default_output, encode, light};
+use super::render::{Grade, Light, default_output, encode, light};
 use crate::args::RenderArgs;
 use crate::commands::{self, solving};
 use crate::denoise::Denoiser;
@@ -20,7 +20,7 @@ use crate::output::Output;
 use crate::progress::{Goal, Progress};
 
 /// Camera rays per pixel where the user does not say how long.
-const DEFAULT_SAMPLES: u32 = 64;
+pub(super) const DEFAULT_SAMPLES: u32 = 64;
 /// Camera rays per pixel of the first pass, and before an estimated error is believed.
 const FIRST_SAMPLES: f64 = 8.0;
 /// By what each pass makes the number of rays grow: plans are made anew, and signals and clocks are heeded, in between.
@@ -86,18 +86,12 @@ pub(super) fn run(
     let mut progress = Progress::new(goal, args.load.quiet).counting("camera rays");
     let options = GatherOptions { width, height, crop, seed: settings.seed, adaptive: true };
     let mut gather = Gather::new(&loaded.patches, &solution, camera, &options);
-    loop {
-        let next = (gather.samples() * GROWTH).max(FIRST_SAMPLES).min(f64::from(most));
-        gather.advance_to(next);
+    advance(&mut gather, most, |gather| {
         if progress.wants_update() {
             progress.update(gather.rays(), gather.relative_error());
         }
-        let error = || if gather.samples() < FIRST_SAMPLES { f64::INFINITY } else { gather.relative_error() };
-        let is_full = gather.samples() >= f64::from(most) * (1.0 - 1e-9);
-        if progress.is_reached(gather.rays(), error) || is_full || interrupt::requested() {
-            break;
-        }
-    }
+        progress.is_reached(gather.rays(), || believed_error(gather))
+    });
     let interrupted = interrupted || interrupt::requested();
     progress.finish();
     let gathering = progress.seconds();
@@ -107,7 +101,7 @@ pub(super) fn run(
     let layers = layers(args, loaded, camera, &film, &gather);
     let samples = (gather.samples().ceil() as u32).min(MOST_LAYER_SAMPLES);
     display::denoise(denoiser.as_ref(), &mut picture, loaded, camera, &film, samples)?;
-    let factor = args.display.exposure.factor(&picture);
+    let grade = Grade::of(args, &picture);
     let how = format!(
         "{} rays, {:.1} camera rays per pixel, seed {}, preset {:?}{}",
         solution.rays(),
@@ -116,7 +110,7 @@ pub(super) fn run(
         settings.preset,
         if denoiser.is_some() { ", denoised" } else { "" }
     );
-    output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
+    output.write(&encode(args, loaded, &mut picture, &layers, grade, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
     let dropped = commands::invalid_warning(gather.invalid(), "camera rays");
     let dropped: Vec<String> = dropped.map(|w| format!("{}: {w}", args.load.scene)).into_iter().collect();
@@ -131,7 +125,7 @@ pub(super) fn run(
             gather.samples(),
             camera_rate * 1e-6,
             if error.is_finite() { format!("{:.2} %", 100.0 * error) } else { "unknown".to_owned() },
-            factor.log2(),
+            grade.factor.log2(),
         );
     }
     if args.load.json {
@@ -148,7 +142,7 @@ pub(super) fn run(
             "picture_error": error,
             "invalid_deposits": solution.invalid_deposits(), "invalid_camera_rays": gather.invalid(),
             "power": commands::balance_json(&balance),
-            "exposure_ev": factor.log2(),
+            "exposure_ev": grade.factor.log2(),
             "expected": loaded.expected.json(),
             "warnings": warnings,
         });
@@ -157,9 +151,26 @@ pub(super) fn run(
     Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
 }
 
+/// Passes until there are `most` camera rays per pixel, it is enough, or a signal ends it.
+pub(super) fn advance(gather: &mut Gather, most: u32, mut is_enough: impl FnMut(&Gather) -> bool) {
+    loop {
+        let next = (gather.samples() * GROWTH).max(FIRST_SAMPLES).min(f64::from(most));
+        gather.advance_to(next);
+        let is_full = gather.samples() >= f64::from(most) * (1.0 - 1e-9);
+        if is_enough(gather) || is_full || interrupt::requested() {
+            return;
+        }
+    }
+}
+
+/// The estimated error, once it can be believed.
+pub(super) fn believed_error(gather: &Gather) -> f64 {
+    if gather.samples() < FIRST_SAMPLES { f64::INFINITY } else { gather.relative_error() }
+}
+
 /// The layers that are wanted. Direct light holds what emits and is seen itself, so that it and indirect light add up to
 /// the picture.
-fn layers(args: &RenderArgs, loaded: &Loaded, camera: &Camera, film: &Film, gather: &Gather) -> Aovs {
+pub(super) fn layers(args: &RenderArgs, loaded: &Loaded, camera: &Camera, film: &Film, gather: &Gather) -> Aovs {
     let wants = |layer| args.display.wants(layer);
     let samples = (gather.samples().ceil() as u32).min(MOST_LAYER_SAMPLES);
     let mut layers = display::layers(args, loaded, camera, film, samples);

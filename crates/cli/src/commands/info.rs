@@ -2,6 +2,7 @@
 
 use anyhow::anyhow;
 use serde_json::json;
+use twinray::scene::CameraAnimation;
 use twinray::solve::{Params, Solver, state_bytes};
 
 use crate::args::InfoArgs;
@@ -40,6 +41,8 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
     let albedo = patches.mean_albedo();
     let cameras: Vec<&str> = loaded.cameras.iter().map(|c| c.name.as_str()).collect();
 
+    let animations: Vec<String> = loaded.animations.iter().map(|a| animation_line(a, &cameras)).collect();
+
     if args.load.json {
         let report = json!({
             "scene": loaded.name,
@@ -52,7 +55,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
             "shared_edges": closedness.shared_edges, "escaping_rays": closedness.escaping_rays,
             "bytes": { "rays": kernel, "patches": constants, "solver": state },
             "power": commands::balance_json(&balance),
-            "cameras": cameras,
+            "cameras": cameras, "animations": animations,
             "expected": loaded.expected.json(),
             "warnings": warnings,
         });
@@ -86,8 +89,17 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<Ending> {
         bytes_of_a_patch(patches.len(), glossy)
     );
     println!("cameras    {}", cameras.join(", "));
+    if !animations.is_empty() {
+        println!("animations {}", animations.join(", "));
+    }
     println!("{}", commands::balance_line(&balance));
     Ok(Ending::Done)
+}
+
+/// What an animation moves, and for how long.
+fn animation_line(animation: &CameraAnimation, cameras: &[&str]) -> String {
+    let [start, end] = animation.span();
+    format!("{} (of {}, {:.1} s)", animation.name, cameras.get(animation.camera).unwrap_or(&"?"), end - start)
 }
 
 /// What a patch costs the solver, in words.

@@ -4,6 +4,7 @@ pub mod compare;
 mod compare_pictures;
 mod compare_solutions;
 pub mod export;
+mod frames;
 mod gather;
 pub mod info;
 pub mod merge;

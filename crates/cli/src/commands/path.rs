@@ -7,7 +7,7 @@ use serde_json::json;
 use twinray::render::reference::{PathPictureOptions, PixelTracer, Technique};
 use twinray::scene::Camera;
 
-use super::render::{default_output, encode};
+use super::render::{Grade, default_output, encode};
 use crate::args::{Preset, RenderArgs};
 use crate::denoise::Denoiser;
 use crate::display::{self, AovArg, Film};
@@ -18,9 +18,9 @@ use crate::output::Output;
 use crate::progress::{Goal, Progress};
 
 /// Paths per pixel where the user does not say how long.
-const DEFAULT_SAMPLES: u32 = 64;
+pub(super) const DEFAULT_SAMPLES: u32 = 64;
 /// Paths per pixel before an estimated error is believed.
-const FIRST_SAMPLES: u32 = 16;
+pub(super) const FIRST_SAMPLES: u32 = 16;
 
 /// Samples of a pixel beyond which its layers no longer change to speak of.
 pub(super) const MOST_LAYER_SAMPLES: u32 = 64;
@@ -85,10 +85,10 @@ pub(super) fn run(
         layers.error = Some(tracer.variance().iter().map(|v| v.sqrt()).collect());
     }
     display::denoise(denoiser.as_ref(), &mut picture, loaded, camera, &film, samples)?;
-    let factor = args.display.exposure.factor(&picture);
+    let grade = Grade::of(args, &picture);
     let denoised = if denoiser.is_some() { ", denoised" } else { "" };
     let how = format!("{} paths per pixel, seed {seed}{denoised}", tracer.samples());
-    output.write(&encode(args, loaded, &mut picture, &layers, factor, &how, &path))?;
+    output.write(&encode(args, loaded, &mut picture, &layers, grade, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
     let paths = pixels * u64::from(tracer.samples());
@@ -101,7 +101,7 @@ pub(super) fn run(
             tracer.samples(),
             rate * 1e-6,
             100.0 * error,
-            factor.log2(),
+            grade.factor.log2(),
         );
     }
     if args.load.json {
@@ -114,7 +114,7 @@ pub(super) fn run(
             "paths_per_second": rate,
             "relative_error": error,
             "invalid_paths": tracer.invalid(),
-            "exposure_ev": factor.log2(),
+            "exposure_ev": grade.factor.log2(),
             "expected": loaded.expected.json(),
             "warnings": loaded.warnings,
         });

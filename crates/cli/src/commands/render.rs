@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
+use glam::DMat3;
 use serde_json::json;
 use twinray::format;
-use twinray::render::{self, Aovs, Lobes, Picture, PictureOptions};
+use twinray::render::{self, Aovs, Lobes, Picture, PictureOptions, WhiteBalance};
 use twinray::scene::Camera;
 use twinray::solve::{Observer, Solution};
 
 use crate::args::{LobesArg, MethodArg, RenderArgs};
-use crate::commands::{gather, path, solving};
+use crate::commands::{frames, gather, path, solving};
 use crate::display::{self, DEFAULT_HEIGHT, Film};
 use crate::estimate::{PictureWork, Work};
 use crate::failure::Ending;
@@ -22,29 +23,26 @@ use crate::settings::Settings;
 use crate::{commands, interrupt, stored};
 
 /// Camera rays per pixel where the user does not say.
-const DEFAULT_SAMPLES: u32 = 16;
+pub(super) const DEFAULT_SAMPLES: u32 = 16;
 
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
+    if let Some(motion) = &args.motion.path {
+        return frames::run(args, motion);
+    }
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.load.scene));
     if !matches!(extension(&path).as_str(), "png" | "exr") {
         bail!("{}: expected a name that ends in .png or .exr", path.display());
     }
     let method = args.method();
     args.display.check(method, &extension(&path))?;
-    match method {
-        MethodArg::Path => path::check(args)?,
-        MethodArg::Gather => gather::check(args)?,
-        MethodArg::Patches => {}
-    }
+    check(args)?;
     let denoiser = display::denoiser(args)?;
     commands::set_threads(args.load.threads);
     interrupt::install();
     let start = Instant::now();
     let loaded = input::load(&args.load, Some(&args.view), &work(args))?;
-    let overridden = loaded.cameras.first().is_some_and(|c| c.name == "command line");
-    let camera = input::pick_camera(&loaded.cameras, args.view.camera.as_deref().filter(|_| !overridden))?;
-    let camera = &display::camera(args, &loaded, camera)?;
+    let camera = &display::camera(args, &loaded, loaded.camera(args.view.camera.as_deref())?, None)?;
     let film = display::film(args, camera)?;
     let output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
@@ -64,25 +62,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
     let start = Instant::now();
     let Film { width, height, crop } = film;
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
-    let lobes = match args.lobes {
-        None | Some(LobesArg::Traced) => Lobes::Traced,
-        Some(LobesArg::Patches) => Lobes::Patches,
-    };
-    let options = PictureOptions { width, height, crop, samples, flat: args.flat, lobes };
-    if !solution.is_observed() && (args.flat || matches!(lobes, Lobes::Patches)) {
-        let matte = format!(
-            "{}: glossy surfaces look matte with --flat and --lobes patches, since a file knows no camera: render the scene itself",
-            args.load.scene
-        );
-        commands::print_warnings(&[matte], args.load.quiet);
-    }
+    let options = PictureOptions { width, height, crop, samples, flat: args.flat, lobes: lobes(args) };
+    commands::print_warnings(matte_warning(args, &solution).as_slice(), args.load.quiet);
     let mut picture = render::render(&loaded.patches, &solution, camera, &options);
     let layers = display::layers(args, &loaded, camera, &film, samples);
     display::denoise(denoiser.as_ref(), &mut picture, &loaded, camera, &film, samples)?;
-    let factor = args.display.exposure.factor(&picture);
+    let grade = Grade::of(args, &picture);
     let mut how = format!("{} rays, seed {}, preset {:?}", solution.rays(), settings.seed, settings.preset);
     how += if denoiser.is_some() { ", denoised" } else { "" };
-    output.write(&encode(args, &loaded, &mut picture, &layers, factor, &how, &path))?;
+    output.write(&encode(args, &loaded, &mut picture, &layers, grade, &how, &path))?;
     let drawing = start.elapsed().as_secs_f64();
 
     let balance = solution.balance();
@@ -100,7 +88,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
             if rate > 0.0 { format!(" ({:.2} M/s)", rate * 1e-6) } else { String::new() },
             100.0 * solution.relative_error(),
             settings.seed,
-            factor.log2(),
+            grade.factor.log2(),
         );
     }
     if args.load.json {
@@ -114,13 +102,58 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Ending> {
             "relative_error": solution.relative_error(),
             "invalid_deposits": solution.invalid_deposits(),
             "power": commands::balance_json(&balance),
-            "exposure_ev": factor.log2(),
+            "exposure_ev": grade.factor.log2(),
             "expected": loaded.expected.json(),
             "warnings": warnings,
         });
         println!("{report:#}");
     }
     Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
+}
+
+/// Refuses settings that the method would ignore.
+pub(super) fn check(args: &RenderArgs) -> anyhow::Result<()> {
+    match args.method() {
+        MethodArg::Path => path::check(args),
+        MethodArg::Gather => gather::check(args),
+        MethodArg::Patches => Ok(()),
+    }
+}
+
+/// How lobes are shown with --method patches.
+pub(super) fn lobes(args: &RenderArgs) -> Lobes {
+    match args.lobes {
+        None | Some(LobesArg::Traced) => Lobes::Traced,
+        Some(LobesArg::Patches) => Lobes::Patches,
+    }
+}
+
+/// What a picture of patches misses that no camera observed.
+pub(super) fn matte_warning(args: &RenderArgs, solution: &Solution) -> Option<String> {
+    (!solution.is_observed() && (args.flat || matches!(lobes(args), Lobes::Patches))).then(|| {
+        let reason = if args.motion.path.is_some() {
+            "a path has no fixed camera: leave them out"
+        } else {
+            "a file knows no camera: render the scene itself"
+        };
+        format!("{}: glossy surfaces look matte with --flat and --lobes patches, since {reason}", args.load.scene)
+    })
+}
+
+/// What makes radiance a picture for a screen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grade {
+    /// The exposure, on radiance.
+    pub factor: f64,
+    /// The white balance.
+    pub white: DMat3,
+}
+
+impl Grade {
+    /// As the options say, or as this picture asks.
+    pub fn of(args: &RenderArgs, picture: &Picture) -> Self {
+        Self { factor: args.display.exposure.factor(picture), white: args.display.white_balance.matrix(picture) }
+    }
 }
 
 /// The light that the picture is taken of.
@@ -164,7 +197,7 @@ pub(super) fn light(args: &RenderArgs, loaded: &Loaded, camera: Option<&Camera>,
 }
 
 /// What is to be done, for the estimate.
-fn work(args: &RenderArgs) -> Work {
+pub(super) fn work(args: &RenderArgs) -> Work {
     let (is_traced, is_gathered) = (args.method() == MethodArg::Path, args.method() == MethodArg::Gather);
     let samples = args.path.samples.unwrap_or(DEFAULT_SAMPLES);
     let solve = match is_traced || stored::is_solution(&args.load.scene) {
@@ -194,7 +227,7 @@ pub(super) fn encode(
     loaded: &Loaded,
     picture: &mut Picture,
     layers: &Aovs,
-    factor: f64,
+    grade: Grade,
     how: &str,
     path: &Path,
 ) -> Vec<u8> {
@@ -206,7 +239,7 @@ pub(super) fn encode(
         let (image, white) = (&picture.image, args.display.white_luminance());
         return format::write_exr_aovs(image.width, image.height, &image.pixels, layers, white, &text);
     }
-    args.display.white_balance.apply(picture);
-    let bytes = render::display::to_srgb8(picture, factor, args.display.curve());
+    WhiteBalance::adapt(grade.white, picture);
+    let bytes = render::display::to_srgb8(picture, grade.factor, args.display.curve());
     format::write_png(picture.image.width, picture.image.height, &bytes, &text)
 }

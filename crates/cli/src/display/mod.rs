@@ -59,6 +59,13 @@ pub struct Dof {
     distance: Option<f64>,
 }
 
+impl Dof {
+    /// What is sharp, in the scene's unit, if it says that.
+    pub fn distance(self) -> Option<f64> {
+        self.distance
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Aperture {
     FNumber(f64),
@@ -187,11 +194,12 @@ fn words(values: &[impl ValueEnum]) -> String {
     values.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-/// The scene's camera with the projection and the lens that the options ask for.
+/// The scene's camera with the projection and the lens that the options ask for. `focus`, metres, is what is sharp
+/// whatever the options say.
 ///
 /// # Errors
 /// If a lens is asked of a parallel projection, or to focus on nothing.
-pub fn camera(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Result<Camera> {
+pub fn camera(args: &RenderArgs, loaded: &Loaded, camera: &Camera, focus: Option<f64>) -> anyhow::Result<Camera> {
     let display = &args.display;
     if display.panorama {
         let up = args.view.up.map_or(glam::DVec3::Y, glam::DVec3::from_array);
@@ -207,7 +215,7 @@ pub fn camera(args: &RenderArgs, loaded: &Loaded, camera: &Camera) -> anyhow::Re
         bail!("--dof: camera \"{}\" is a parallel projection, which has no lens; --fov gives it one", camera.name);
     };
     let unit = loaded.metres_per_unit();
-    let focus = dof.distance.map(|d| d * unit).or_else(|| distance_in_the_middle(loaded, camera));
+    let focus = focus.or(dof.distance.map(|d| d * unit)).or_else(|| distance_in_the_middle(loaded, camera));
     let focus = focus.ok_or_else(|| {
         anyhow!("--dof: there is nothing in the middle of the picture to focus on; give a distance, such as f/2.8,3.5")
     })?;

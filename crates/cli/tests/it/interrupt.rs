@@ -40,6 +40,31 @@ fn ctrl_c_writes_the_reference() {
     assert!(kept.provenance.rays >= kept.light.len() as u64);
 }
 
+/// Finished frames stay, none is half, and the message says how to go on.
+#[test]
+fn ctrl_c_leaves_whole_frames() {
+    let place = Place::new();
+    let keys = r#"{ "keys": [{ "time": 0, "camera": 0 }, { "time": 100, "camera": 0, "fov": 50 }] }"#;
+    place.write("long.json", keys);
+    let args = ["render", "cornell", "--path", "long.json", "-o", "f%d.png", "--patches", "500", "--rays", "50000"];
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin!("twinray"))
+        .args([&args[..], &["--size", "64x48", "--spp", "16"]].concat())
+        .current_dir(place.path(""))
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("% ") && line.contains("of 2401")), "no progress");
+    send(child.id(), "-INT");
+    let said: Vec<String> = lines.collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let frames = place.files().len() - 1;
+    assert!(frames > 0);
+    (0..frames).for_each(|k| shows_something(&place.read(&format!("f{k}.png"))));
+    let hint = format!("{frames} of 2401 frames are done; --frames {frames}..2401 makes the rest");
+    assert!(said.iter().any(|line| line.contains(&hint)), "{hint} is missing in {said:?}");
+}
+
 /// What job schedulers and service managers send.
 #[test]
 fn sigterm_writes_the_solution() {

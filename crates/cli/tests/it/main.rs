@@ -9,6 +9,7 @@ mod completion;
 mod display;
 mod export;
 mod faults;
+mod frames;
 mod interrupt;
 mod lights;
 mod merge;

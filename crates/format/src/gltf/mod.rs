@@ -1,9 +1,10 @@
 //! glTF 2.0, binary and text: from a document to a scene, in the order a reader of the code expects.
 //!
 //! `container` opens the file, `json` finds its way in it, `node` walks the tree, `primitive` and `material`
-//! and `light` read what stands there, `write` goes the other way. Called by `read_scene`.
+//! and `light` read what stands there, `animation` how cameras move, `write` goes the other way. Called by `read_scene`.
 
 mod accessor;
+mod animation;
 mod container;
 mod json;
 mod light;
@@ -27,7 +28,6 @@ use self::primitive::Primitives;
 use crate::context::Context;
 use crate::error::FormatError;
 use crate::geometry::{Account, RICHEST_VERTEX, clean, mesh_bytes, no_triangles};
-use crate::warning::name_list;
 
 pub use self::write::write_glb;
 
@@ -69,12 +69,16 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
         meshes: HashMap::new(),
         lights: Lights::default(),
         account: Account::default(),
+        camera_places: Vec::new(),
         scene: Scene::default(),
     };
-    for place in &placed {
+    for (i, place) in placed.iter().enumerate() {
         content.place(context, &root, place)?;
+        let cameras = content.scene.cameras.len();
+        content.camera_places.resize(cameras, i);
     }
-    warn_ignored(context, &root, &placed);
+    content.scene.animations = animation::read(context, &root, &buffers, &placed, &content.camera_places)?;
+    warn_ignored(context, &placed);
     read_extras(context, &root, &mut content.scene);
 
     let Content { materials, mut scene, .. } = content;
@@ -97,6 +101,8 @@ struct Content<'v, 'b> {
     meshes: HashMap<usize, Vec<usize>>,
     lights: Lights,
     account: Account,
+    /// Where each camera of the scene is among the placed nodes.
+    camera_places: Vec<usize>,
     scene: Scene,
 }
 
@@ -224,13 +230,7 @@ fn read_extras(context: &Context<'_>, root: &Element<'_>, scene: &mut Scene) {
     }
 }
 
-fn warn_ignored(context: &mut Context<'_>, root: &Element<'_>, placed: &[Placed<'_>]) {
-    if root.count("animations") > 0 {
-        let names: Vec<String> = (0..root.count("animations").min(20))
-            .filter_map(|i| Some(root.item("animations", i)?.name_or(|| format!("animation {i}"))))
-            .collect();
-        context.sum_up("animations", format!("ignored, nodes stay where the file puts them: {}", name_list(&names)));
-    }
+fn warn_ignored(context: &mut Context<'_>, placed: &[Placed<'_>]) {
     for place in placed {
         if place.node.get("skin").is_some() {
             context.warn(&place.node.path, "the skin is ignored: the mesh keeps the shape in which it was bound");

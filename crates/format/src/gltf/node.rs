@@ -15,6 +15,9 @@ use crate::error::FormatError;
 pub(super) struct Placed<'a> {
     pub(super) node: Element<'a>,
     pub(super) index: usize,
+    /// Index of its parent's node, if it has one.
+    pub(super) parent: Option<usize>,
+    pub(super) to_parent: DAffine3,
     pub(super) to_world: DAffine3,
 }
 
@@ -33,13 +36,13 @@ pub(super) fn walk<'a>(context: &mut Context<'_>, root: &Element<'a>) -> Result<
     };
     // Children are pushed in reverse, so that the first is visited first; `Leave` closes a node.
     enum Step<'a> {
-        Enter(usize, Element<'a>, DAffine3, u64),
+        Enter(usize, Element<'a>, Option<(usize, DAffine3)>, u64),
         Leave(usize),
     }
     let mut stack: Vec<Step<'a>> = Vec::new();
     for (index, node) in starts(context, root)?.into_iter().rev() {
         claim(&mut seen, index, &node)?;
-        stack.push(Step::Enter(index, node, DAffine3::IDENTITY, 1));
+        stack.push(Step::Enter(index, node, None, 1));
     }
     while let Some(step) = stack.pop() {
         let (index, node, parent, depth) = match step {
@@ -59,13 +62,14 @@ pub(super) fn walk<'a>(context: &mut Context<'_>, root: &Element<'a>) -> Result<
                 allowed: context.limits.max_depth,
             });
         }
-        let to_world = parent * local_transform(context, &node)?;
+        let to_parent = local_transform(context, &node)?;
+        let to_world = parent.map_or(to_parent, |(_, parent)| parent * to_parent);
         stack.push(Step::Leave(index));
         for (child_index, child) in links(root, &node, "children")?.into_iter().rev() {
             claim(&mut seen, child_index, &child)?;
-            stack.push(Step::Enter(child_index, child, to_world, depth + 1));
+            stack.push(Step::Enter(child_index, child, Some((index, to_world)), depth + 1));
         }
-        found.push(Placed { node, index, to_world });
+        found.push(Placed { node, index, parent: parent.map(|(parent, _)| parent), to_parent, to_world });
     }
     Ok(found)
 }

@@ -2,6 +2,7 @@
 
 mod any_scene;
 mod export;
+mod gltf_animations;
 mod gltf_faults;
 mod gltf_geometry;
 mod gltf_lights;

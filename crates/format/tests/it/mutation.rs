@@ -16,6 +16,11 @@ fn good_glb() -> Vec<u8> {
     doc.json["materials"][0]["emissiveFactor"] = serde_json::json!([1, 1, 1]);
     doc.json["cameras"] = serde_json::json!([{ "type": "perspective", "perspective": { "yfov": 1 } }]);
     doc.json["nodes"] = serde_json::json!([{ "children": [1], "scale": [-1, 1, 1] }, { "mesh": 0, "camera": 0 }]);
+    let (times, places) = (doc.floats(&[[0.0], [1.0]]), doc.floats(&[[0.0, 0.0, 1.0], [0.0, 1.0, 1.0]]));
+    doc.json["animations"] = serde_json::json!([{
+        "channels": [{ "sampler": 0, "target": { "node": 1, "path": "translation" } }],
+        "samplers": [{ "input": times, "output": places }],
+    }]);
     doc.glb()
 }
 

@@ -111,6 +111,7 @@ fn everything() -> Scene {
         materials,
         images: vec![Arc::new(image)],
         cameras: vec![camera, plan],
+        animations: Vec::new(),
         environment: Some(Environment::Uniform(Rgb::new(1.0, 2.0, 3.5))),
         lights: Vec::new(),
         suggested_patches: Some(1234),

@@ -101,10 +101,16 @@ impl WhiteBalance {
 
     /// Adapts the light of a picture, in place.
     pub fn apply(self, picture: &mut Picture) {
-        if self == WhiteBalance::None {
+        let matrix = self.matrix(picture);
+        Self::adapt(matrix, picture);
+    }
+
+    /// Adapts the light of a picture by a matrix of [`WhiteBalance::matrix`], perhaps that of another picture: what is shown
+    /// one after the other must not change its colour.
+    pub fn adapt(matrix: DMat3, picture: &mut Picture) {
+        if matrix == DMat3::IDENTITY {
             return;
         }
-        let matrix = self.matrix(picture);
         let adapted = |c: [f32; 3]| {
             let light = DVec3::from_array(Rgb::from_f32(c).to_array());
             Rgb::from_array((matrix * light).to_array()).to_f32()
