@@ -33,8 +33,8 @@ pub use authored::{
 };
 pub use bvh::SurfaceHit;
 pub use camera::{Camera, Lens, Projection};
-pub use cells::Cells;
 pub use camera_path::{CameraKey, CameraPath};
+pub use cells::Cells;
 pub use estimate::{Estimate, estimate};
 pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
 pub use punctual::PointLight;

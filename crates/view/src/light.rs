@@ -1,4 +1,4 @@
-//! The light of nodes as bytes: four for the irradiance of a node, 28 more for what a glossy one knows of directions, eight
+//! The light of nodes as bytes: four for the irradiance of a node, 36 more for what a glossy one knows of directions, eight
 //! for the sample that a glossy cell remembers.
 
 use glam::DVec3;
@@ -26,7 +26,8 @@ const LEAST_ERROR: f64 = 1.0 / 4096.0;
 /// The light's bytes: `irradiance` u32 per node (RGB9_E5, over `scale`), `error` u8 per node (relative, 2^(e/16)/4096, 255
 /// unknown), `radiance` u32 per glossy node (mean radiance of all directions, RGB9_E5 over `radianceScale`), `directions` i8
 /// `[glossy nodes][8][3]` (the other factors of the basis over the first, and over the largest that light from one direction
-/// gives them), and `samples` as [`samples`] writes them.
+/// gives them), `lamps` u32 `[glossy nodes][2]` (light straight from what emits, RGB9_E5 over `lampScale`; its direction,
+/// octahedral, 12 bits each, and the root of one less agreement, 8 bits), and `samples` as [`samples`] writes them.
 pub fn light(light: &NodeLight, samples: &[Sample], behind: Behind) -> Vec<u8> {
     let mut container = Container::default();
     let scale_of = scale(light.irradiance.iter().flatten().copied());
@@ -44,9 +45,20 @@ pub fn light(light: &NodeLight, samples: &[Sample], behind: Behind) -> Vec<u8> {
         })
     });
     container.add("directions", directions.collect::<Vec<i8>>());
+    let lamp_scale = scale(light.lamps.iter().flat_map(|l| l.radiance));
+    let lamps = light.lamps.iter().flat_map(|l| {
+        let towards = DVec3::from_array(l.towards.map(f64::from));
+        let agreement = towards.length();
+        let [x, y] = if agreement > 0.0 { octahedral(towards / agreement) } else { [0.0; 2] };
+        // Twelve bits for each number of the direction, eight for what is missing of agreement, fine where little is.
+        let twelve = |x: f64| ((x * 0.5 + 0.5) * 4095.0).round().clamp(0.0, 4095.0) as u32;
+        let spread = ((1.0 - agreement).max(0.0).sqrt() * 255.0).round().min(255.0) as u32;
+        [rgb9e5(l.radiance.map(|c| c / lamp_scale)), twelve(x) | twelve(y) << 12 | spread << 24]
+    });
+    container.add("lamps", lamps.collect::<Vec<u32>>());
     let sample_scale = add_samples(&mut container, samples);
     container.finish(json!({
-        "kind": "light", "rays": behind.rays, "relativeError": finite(behind.error),
+        "kind": "light", "lampScale": lamp_scale, "rays": behind.rays, "relativeError": finite(behind.error),
         "scale": scale_of, "radianceScale": radiance_scale, "sampleScale": sample_scale,
     }))
 }

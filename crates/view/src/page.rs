@@ -18,6 +18,7 @@ macro_rules! modules {
 /// Names and texts of the modules.
 #[rustfmt::skip]
 pub const MODULES: &[(&str, &str)] = modules! {
+    "actions.js"
     "announce.js"
     "camera.js"
     "colours.js"
@@ -26,6 +27,7 @@ pub const MODULES: &[(&str, &str)] = modules! {
     "live.js"
     "lookup.js"
     "main.js"
+    "options.js"
     "panel.js"
     "progress.js"
     "projection.js"
@@ -37,6 +39,7 @@ pub const MODULES: &[(&str, &str)] = modules! {
     "shaders.js"
     "sheet.js"
     "shortcuts.js"
+    "solve.js"
     "ticker.js"
     "url.js"
     "vec.js"

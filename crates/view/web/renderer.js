@@ -345,6 +345,7 @@ export class Renderer {
         const uniforms = {
             uEye: view.eye,
             uScales: [light.scale, light.radianceScale, light.sampleScale, this.#baked],
+            uLampScale: light.lampScale,
             uGlossySlots: resources.glossySlots,
             uMode: options.falseColour ? 1 : 0,
             uCells: options.cells ? 1 : 0,
@@ -391,6 +392,7 @@ export class Renderer {
                 uRadiance: resources.radiance,
                 uDirections: resources.directions,
                 uSamples: resources.samples,
+                uLamps: resources.lamps,
             },
         });
         const names = ["uBase", "uEmission", "uMetal", "uBumps"];

@@ -65,6 +65,7 @@ export class Resources {
             error: new Uint8Array(header.stats.nodes).fill(255),
             scale: 1,
             radianceScale: 1,
+            lampScale: 1,
             sampleScale: 1,
             hasSamples: false,
         };
@@ -73,6 +74,7 @@ export class Resources {
         this.irradiance = dataTexture(gl, "RGB9_E5", new Uint32Array(slots), 1);
         this.radiance = dataTexture(gl, "RGB9_E5", new Uint32Array(glossy), 1);
         this.directions = dataTexture(gl, "RGBA8_SNORM", new Int8Array(4 * DIRECTION_TEXELS * glossy), 4);
+        this.lamps = dataTexture(gl, "RG32UI", new Uint32Array(2 * glossy), 2);
         this.samples = dataTexture(gl, "RG32UI", new Uint32Array(2 * Math.max(1, header.glossy.cells)), 2);
     }
 
@@ -88,19 +90,24 @@ export class Resources {
             light.error = /** @type {Uint8Array} */ (arrays.error);
             light.scale = header.scale;
             light.radianceScale = header.radianceScale;
+            light.lampScale = header.lampScale;
             const irradiance = new Uint32Array(nodes.length);
             for (let slot = 0; slot < nodes.length; slot++) irradiance[slot] = light.irradiance[nodes[slot]];
             fill(gl, this.irradiance, "RGB9_E5", irradiance, 1);
             if (glossySlots > 0) {
                 const radiance = new Uint32Array(glossySlots);
+                const lamps = new Uint32Array(2 * glossySlots);
                 const directions = new Int8Array(4 * DIRECTION_TEXELS * glossySlots);
                 const [from, bytes] = [/** @type {Int8Array} */ (arrays.directions), 4 * DIRECTION_TEXELS];
                 for (let slot = 0; slot < glossySlots; slot++) {
                     const node = nodes[slot];
                     radiance[slot] = arrays.radiance[node];
+                    lamps[2 * slot] = arrays.lamps[2 * node];
+                    lamps[2 * slot + 1] = arrays.lamps[2 * node + 1];
                     directions.set(from.subarray(bytes * node, bytes * (node + 1)), bytes * slot);
                 }
                 fill(gl, this.radiance, "RGB9_E5", radiance, 1);
+                fill(gl, this.lamps, "RG32UI", lamps, 2);
                 fill(gl, this.directions, "RGBA8_SNORM", directions, 4);
             }
         }

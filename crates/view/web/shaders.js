@@ -119,7 +119,8 @@ in vec3 vPoint;
 in vec3 vNormal;
 in vec4 vTexcoords;
 uniform sampler2D uMaterials, uAlbedos, uIrradiance, uRadiance, uDirections;
-uniform usampler2D uSamples;
+uniform usampler2D uSamples, uLamps;
+uniform float uLampScale;
 uniform sampler2D uBase, uEmission, uMetal, uBumps;
 uniform vec3 uEye;
 uniform vec4 uScales; /* irradiance, radiance, samples, exposure */
@@ -192,7 +193,9 @@ vec3 lobe(Look l, vec3 n, vec3 wi, vec3 wo) {
     return (l.f0 * (1.0 - fresnel) + vec3(l.f90 * fresnel)) * (a2 / (PI * d * d)) * (0.5 / smith);
 }
 
-/* By what a lobe of this width shrinks harmonics of degree 1 and 2: those of a Gaussian on the sphere of sharpness 2/α²
+vec3 unpacked(uint bits) { return vec3(bits & 511u, (bits >> 9) & 511u, (bits >> 18) & 511u) * exp2(float(bits >> 27) - 24.0); }
+
+/* By what a lobe of this width shrinks harmonics of degree 1 and 2, and a window against their swinging: those of a Gaussian on the sphere of sharpness 2/α²
    of half vectors, whose mirror directions spread 2 cosθ times as far (Wang et al., SIGGRAPH Asia 2009). */
 vec2 shrink(Look l, float co) {
     float sharp = l.kind == 2 ? max(l.exponent, 0.5) : 1.0 / (2.0 * l.alpha * l.alpha * max(co, 0.2));
@@ -272,7 +275,8 @@ void main() {
         vec3 y1 = 0.8462844 * vec3(r.y, r.z, r.x);
         vec3 y2a = 2.4430126 * vec3(r.x * r.y, r.y * r.z, 0.2886751 * (3.0 * r.z * r.z - 1.0));
         vec2 y2b = 2.4430126 * vec2(r.x * r.z, 0.5 * (r.x * r.x - r.y * r.y));
-        vec3 radiance = vec3(0.0);
+        vec3 radiance = vec3(0.0), lamps = vec3(0.0), towards = vec3(0.0);
+        float spread = 0.0, total = 0.0;
         for (int c = 0; c < 4; c++) {
             if (around.weights[c] == 0.0) continue;
             int slot = int(first) + around.slots[c];
@@ -284,8 +288,24 @@ void main() {
             vec3 last5 = y2a.x * b2.yzw + y2a.y * b3.xyz + y2a.z * vec3(b3.w, b4.xy) + y2b.x * vec3(b4.zw, b5.x) + y2b.y * b5.yzw;
             vec3 sharp = 0.2820948 + k.x * first3 + k.y * last5, blunt = 0.2820948 + 0.5 * first3 + 0.1 * last5;
             radiance += around.weights[c] * even * max(sharp, 0.3 * max(blunt, 0.0));
+            uvec2 lamp = texelFetch(uLamps, at(slot), 0).xy;
+            vec3 arriving = around.weights[c] * unpacked(lamp.x);
+            float bright = luminance(arriving), s = float(lamp.y >> 24) / 255.0;
+            lamps += arriving;
+            towards += bright * fromOctahedron(vec2(lamp.y & 4095u, (lamp.y >> 12) & 4095u) / 2047.5 - 1.0);
+            spread += bright * s * s;
+            total += bright;
         }
-        known += albedo * radiance * uScales.y;
+        vec3 mirrored = albedo * radiance * uScales.y;
+        if (total > 0.0) {
+            /* Lamps as one direction, whose spread widens the lobe: 1 − R is 1/κ of directions about a mean, and α²/2 of a lobe's. */
+            Look wide = l;
+            wide.alpha = min(sqrt(l.alpha * l.alpha + 0.5 * spread / total), 1.0);
+            wide.exponent = max(2.0 / (wide.alpha * wide.alpha) - 2.0, 0.0);
+            vec3 d = normalize(towards);
+            mirrored += lobe(wide, n, d, wo) * lamps * (max(dot(n, d), 0.0) * uLampScale);
+        }
+        known += mirrored;
 
         if (uSampled) {
             /* The remembered sample of a cell nearby, so that cells blend in the mean over frames. */
@@ -298,13 +318,11 @@ void main() {
             uint cells = front ? more.x : more.y;
             uvec2 packed = texelFetch(uSamples, at(int(cells) + cellAt(record, more, place)), 0).xy;
             if (packed.x != 0u) {
-                vec3 brought = vec3(packed.x & 511u, (packed.x >> 9) & 511u, (packed.x >> 18) & 511u) * exp2(float(packed.x >> 27) - 24.0) * uScales.z;
+                vec3 brought = unpacked(packed.x) * uScales.z;
                 vec2 octahedral = vec2(int(packed.y << 16) >> 16, int(packed.y) >> 16) / 32767.0;
                 vec3 wi = fromOctahedron(octahedral);
-                vec3 below = reflect(wi, n);
-                float a = dot(wi, r), b = dot(below, r);
-                float part = (2.0 + 3.0 * k.x * (a + b) + 5.0 * k.y * (1.5 * (a * a + b * b) - 1.0)) / (4.0 * PI);
-                sampled = brought * (lobe(l, n, wi, wo) - albedo * max(part, 0.0) / max(dot(n, wi), 0.1));
+                /* What is shown is a mean of what is known and of samples: n of them count n to PRIOR of renderer.js. */
+                sampled = brought * lobe(l, n, wi, wo) - mirrored;
                 /* Rare bright ones would stay as dots for hundreds of updates. */
                 sampled *= min(1.0, FIREFLY * luminance(known) / max(abs(luminance(sampled)), 1e-30));
             }

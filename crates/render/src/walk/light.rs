@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use twinray_scene::{PatchScene, Rgb};
 use twinray_solve::Solution;
 
-use super::lobes::{BASIS, Lobes, basis};
+use super::lobes::{BASIS, Lobes, Moments, basis};
 use super::nodes::Nodes;
 use crate::lights::Lights;
 use crate::reconstruct::{Reconstruction, Surfaces};
@@ -19,6 +19,17 @@ pub struct NodeLight {
     pub error: Vec<f32>,
     /// Per glossy node: radiance of all directions as the factors of [`super::basis`], W·sr⁻¹·m⁻² (or nit).
     pub radiance: Vec<[[f32; 3]; BASIS]>,
+    /// Per glossy node: light straight from what emits.
+    pub lamps: Vec<Lamp>,
+}
+
+/// Light straight from all that emits, as if it came from about one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lamp {
+    /// Radiance over all directions, W·m⁻² (or lux): irradiance of a surface that faces it.
+    pub radiance: [f32; 3],
+    /// Mean direction by luminance: a unit vector times how much directions agree, 1 where all are the same.
+    pub towards: [f32; 3],
 }
 
 /// The remembered sample of a glossy cell, scaled so that its reflection is right in the mean over solutions.
@@ -58,7 +69,8 @@ impl<'a> WalkLight<'a> {
             moments[0] = e.map(|c| c * even);
             moments
         });
-        NodeLight { radiance: radiance.collect(), error: self.errors(solution), irradiance }
+        let (radiance, lamps) = (radiance.collect(), vec![Lamp::default(); self.nodes.glossy_nodes]);
+        NodeLight { radiance, lamps, error: self.errors(solution), irradiance }
     }
 
     /// The light of a solution. Radiance at glossy nodes is the mean over `rounds` gathers from this solution and those
@@ -76,8 +88,14 @@ impl<'a> WalkLight<'a> {
                 self.lobes.gather(self.scene, &lights, self.nodes, solution, solution.rays().max(1) as f64);
             }
         }
-        let radiance = self.lobes.means().map(|moments| moments.map(Rgb::to_f32)).collect();
-        NodeLight { irradiance, error: self.errors(solution), radiance }
+        let radiance = self.lobes.means().map(|moments| moments.radiance.map(Rgb::to_f32)).collect();
+        let lamp = |m: Moments| {
+            let luminance = m.lamps.luminance();
+            let towards = if luminance > 0.0 { m.towards / luminance } else { DVec3::ZERO };
+            Lamp { radiance: m.lamps.to_f32(), towards: towards.to_array().map(|x| x as f32) }
+        };
+        let lamps = self.lobes.means().map(lamp).collect();
+        NodeLight { irradiance, error: self.errors(solution), radiance, lamps }
     }
 
     fn errors(&self, solution: &Solution) -> Vec<f32> {

@@ -1,8 +1,9 @@
 //! What arrives at a glossy place from all directions, in spherical harmonics of degree 2 and less.
 //!
 //! Radiance of the hemisphere, mirrored below the surface so that it has no step at the horizon, which few harmonics
-//! could not follow. Gathered by rays from the place, light straight from what emits by shadow rays, so that small lamps
-//! make no noise; sums go on over solutions. Basis: Ramamoorthi and Hanrahan, "An efficient representation for irradiance
+//! could not follow. Gathered by rays from the place; light straight from what emits is kept apart, as if it came from one
+//! blurred direction: lamps are too bright for harmonics, which would smear them over half of the sky. Sums go on over
+//! solutions. Basis: Ramamoorthi and Hanrahan, "An efficient representation for irradiance
 //! environment maps" (SIGGRAPH 2001), whose convolution the viewer does with the lobe in place of the cosine.
 
 use std::f64::consts::TAU;
@@ -24,6 +25,9 @@ pub const BASIS: usize = 9;
 const RAYS: u32 = 48;
 /// Shadow rays of a place in one round.
 const SHADOW_RAYS: u32 = 16;
+/// Of the rays, so many are no lamps; what is so many times brighter than these in the mean is one.
+const MOST_RAYS: usize = 36;
+const BRIGHT: f64 = 3.0;
 /// Panes that a ray passes.
 const MOST_PANES: u32 = 8;
 
@@ -43,8 +47,30 @@ pub fn basis(d: DVec3) -> [f64; BASIS] {
     ]
 }
 
-/// Moments of the radiance that arrives.
-type Moments = [Rgb; BASIS];
+/// What arrives at a place, or sums of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moments {
+    /// Factors of the harmonics, of light from surfaces.
+    pub radiance: [Rgb; BASIS],
+    /// Radiance over all directions, of light straight from what emits, W·m⁻²: without a cosine.
+    pub lamps: Rgb,
+    /// The same luminance times its direction.
+    pub towards: DVec3,
+}
+
+impl Moments {
+    const NONE: Self = Self { radiance: [Rgb::BLACK; BASIS], lamps: Rgb::BLACK, towards: DVec3::ZERO };
+
+    fn scaled(&self, by: f64) -> Self {
+        Self { radiance: self.radiance.map(|m| m * by), lamps: self.lamps * by, towards: self.towards * by }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.radiance.iter_mut().zip(other.radiance).for_each(|(s, m)| *s += m);
+        self.lamps += other.lamps;
+        self.towards += other.towards;
+    }
+}
 
 /// Moments of all glossy nodes, summed up over rounds.
 #[derive(Debug, Default)]
@@ -58,13 +84,12 @@ impl Lobes {
     /// Gathers once more from `solution`, which counts with `weight`.
     pub fn gather(&mut self, scene: &PatchScene, lights: &Lights, nodes: &Nodes, solution: &Solution, weight: f64) {
         let places = &nodes.places[..nodes.glossy_nodes];
-        self.sums.resize(places.len(), [Rgb::BLACK; BASIS]);
+        self.sums.resize(places.len(), Moments::NONE);
         let round = self.rounds;
         let gathered = self.sums.par_iter_mut().zip(places).enumerate();
         gathered.for_each(|(index, (sum, place))| {
             let mut random = Stream::new(round, 0x10BE5, index as u64);
-            let moments = moments(scene, lights, solution, place, &mut random);
-            sum.iter_mut().zip(moments).for_each(|(s, m)| *s += m * weight);
+            sum.add(&moments(scene, lights, solution, place, &mut random).scaled(weight));
         });
         self.weight += weight;
         self.rounds += 1;
@@ -72,7 +97,7 @@ impl Lobes {
 
     /// Mean moments per glossy node.
     pub fn means(&self) -> impl Iterator<Item = Moments> + '_ {
-        self.sums.iter().map(|sum| sum.map(|s| s / self.weight))
+        self.sums.iter().map(|sum| sum.scaled(1.0 / self.weight))
     }
 }
 
@@ -83,25 +108,39 @@ fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Pla
     let front = scene.normal(place.patch);
     let normal = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
     let frame = Frame::from_normal(front);
-    let mut sum = [Rgb::BLACK; BASIS];
-    let mut add = |direction: DVec3, radiance: Rgb| {
+    let mut sum = Moments::NONE;
+    let add = |sum: &mut Moments, direction: DVec3, radiance: Rgb| {
         // The mirror image makes the other half of the sphere.
         let below = direction - 2.0 * normal.dot(direction) * normal;
         let (a, b) = (basis(direction), basis(below));
-        for (k, s) in sum.iter_mut().enumerate() {
+        for (k, s) in sum.radiance.iter_mut().enumerate() {
             *s += radiance * (a[k] + b[k]);
         }
     };
     // A golden lattice, shifted for each place and round.
     let shift = [random.uniform(), random.uniform()];
-    for k in 0..RAYS {
-        let z = ((f64::from(k) + shift[0]) / f64::from(RAYS)).fract();
-        let angle = TAU * (f64::from(k) * 0.618_033_988_749_895 + shift[1]);
-        let radius = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = libm::sincos(angle);
-        let direction = frame.to_world(DVec3::new(radius * cos, radius * sin, z));
-        let radiance = reflected_towards(scene, solution, place.patch, point, direction);
-        add(direction, radiance * (TAU / f64::from(RAYS)));
+    let rays: Vec<(DVec3, Rgb)> = (0..RAYS)
+        .map(|k| {
+            let z = ((f64::from(k) + shift[0]) / f64::from(RAYS)).fract();
+            let angle = TAU * (f64::from(k) * 0.618_033_988_749_895 + shift[1]);
+            let radius = (1.0 - z * z).max(0.0).sqrt();
+            let (sin, cos) = libm::sincos(angle);
+            let direction = frame.to_world(DVec3::new(radius * cos, radius * sin, z));
+            (direction, reflected_towards(scene, solution, place.patch, point, direction))
+        })
+        .collect();
+    let mut luminances: Vec<f64> = rays.iter().map(|(_, radiance)| radiance.luminance()).collect();
+    luminances.sort_by(f64::total_cmp);
+    // What is much brighter than most of the rest is a lamp to the eye: a door that opens to a sunlit room.
+    let most = &luminances[..MOST_RAYS];
+    let limit = BRIGHT * most.iter().sum::<f64>() / MOST_RAYS as f64;
+    for (direction, radiance) in rays {
+        let radiance = radiance * (TAU / f64::from(RAYS));
+        let luminance = radiance.luminance();
+        let kept = (limit * TAU / f64::from(RAYS) / luminance.max(f64::MIN_POSITIVE)).min(1.0);
+        add(&mut sum, direction, radiance * kept);
+        sum.lamps += radiance * (1.0 - kept);
+        sum.towards += direction * (luminance * (1.0 - kept));
     }
     for _ in 0..SHADOW_RAYS {
         let (choice, at) = (random.uniform(), [random.uniform(), random.uniform()]);
@@ -113,7 +152,9 @@ fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Pla
             Some((end, normal_there)) => scene.transmittance(point, front, end, normal_there),
             None => scene.transmittance_from_sky(place.patch, point, light.towards),
         };
-        add(light.towards, light.radiance * seen / (light.density * f64::from(SHADOW_RAYS)));
+        let arriving = light.radiance * seen / (light.density * f64::from(SHADOW_RAYS));
+        sum.lamps += arriving;
+        sum.towards += light.towards * arriving.luminance();
     }
     sum
 }

@@ -9,6 +9,6 @@ mod light;
 mod lobes;
 mod nodes;
 
-pub use light::{NodeLight, Sample, WalkLight};
+pub use light::{Lamp, NodeLight, Sample, WalkLight};
 pub use lobes::{BASIS, basis};
 pub use nodes::{Lattice, NO_NODE, Nodes};
