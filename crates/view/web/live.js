@@ -2,19 +2,7 @@
 
 import { readContainer } from "twinray/walk.js";
 
-/** @typedef {import("twinray/walk.js").Walk} Walk */
-/** @typedef {import("twinray/walk.js").Container} Container */
-/**
- * @typedef {object} Status
- * @property {"solving"|"paused"|"finished"|"lost"} state
- * @property {number} rays
- * @property {number} rate rays per second
- * @property {number} error relative, NaN while unknown
- * @property {number} seconds
- * @property {{rays?: number, error?: number, seconds?: number}|null} goal
- * @property {string} [message]
- */
-
+/** @import { Container, Status, Walk } from "twinray/types.js" */
 /** Milliseconds between questions for the state of the solve, and before a lost server is asked again. */
 const STATUS_INTERVAL = 500;
 const RETRY = 1500;

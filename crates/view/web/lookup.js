@@ -1,12 +1,12 @@
 // What is known at a place of a triangle: the shader's look-ups once more, for a single point.
 
-/** @typedef {import("twinray/walk.js").Walk} Walk */
-/** @typedef {import("twinray/resources.js").Resources} Resources */
+/** @import { Vec3, Walk } from "twinray/types.js" */
+/** @import { Resources } from "twinray/resources.js" */
 
 /**
  * @typedef {object} Place
- * @property {number[]} point
- * @property {number[]} normal of the triangle, on the side that is seen
+ * @property {Vec3} point
+ * @property {Vec3} normal of the triangle, on the side that is seen
  * @property {number} material
  * @property {number} cell within the triangle's side
  * @property {{slot: number, weight: number}[]} around
@@ -31,7 +31,7 @@ export function find(walk, resources, triangle, u, v, front) {
         return [0, 1, 2].map((i) => positions[3 * vertex + i]);
     });
     const [p, q] = [b, c].map((x) => x.map((y, k) => y - a[k]));
-    const point = a.map((x, k) => x + u * p[k] + v * q[k]);
+    const point = /** @type {Vec3} */ (a.map((x, k) => x + u * p[k] + v * q[k]));
     const across = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
     const size = (front ? 1 : -1) * Math.hypot(...across);
     const record = resources.records.subarray(8 * triangle, 8 * triangle + 8);
@@ -39,7 +39,7 @@ export function find(walk, resources, triangle, u, v, front) {
     const { around, cell } = locate(record, u, v);
     return {
         point,
-        normal: across.map((x) => x / size),
+        normal: /** @type {Vec3} */ (across.map((x) => x / size)),
         material: record[3] & 0xffff,
         cell,
         around: around.map(([slot, weight]) => ({ slot: first + slot, weight })),
@@ -111,25 +111,30 @@ export function unpack(bits, scale) {
  * @param {Place} place
  */
 export function irradianceAt({ light, nodes }, { around }) {
+    /** @type {Vec3} */
     const irradiance = [0, 0, 0];
-    let error = 0;
+    let [error, known] = [0, 0];
     for (const { slot, weight } of around) {
         const node = nodes[slot];
         const e = unpack(light.irradiance[node], light.scale);
         for (let k = 0; k < 3; k++) irradiance[k] += weight * e[k];
         const code = light.error[node];
-        error += weight * (code === 255 ? NaN : 2 ** (code / 16) / 4096);
+        // Where no ray has been, nothing is known of the error.
+        if (code === 255) continue;
+        error += weight * (2 ** (code / 16) / 4096);
+        known += weight;
     }
-    return { irradiance, illuminance: luminance(irradiance), error };
+    return { irradiance, illuminance: luminance(irradiance), error: known > 0 ? error / known : NaN };
 }
 
 /**
  * Illuminance from the second to the ninety-eighth percentile of nodes.
  * @param {{irradiance: Uint32Array, scale: number}} light
- * @returns {number[]}
+ * @returns {[number, number]}
  */
 export function medianRange({ irradiance, scale }) {
     const step = Math.max(1, Math.floor(irradiance.length / 20000));
+    /** @type {number[]} */
     const values = [];
     for (let node = 0; node < irradiance.length; node += step) {
         const value = luminance(unpack(irradiance[node], scale));

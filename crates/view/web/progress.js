@@ -65,14 +65,18 @@ export function showStatus(status) {
  * half of it is a quarter of the way.
  * @param {Status} status
  */
-export function done({ goal, rays, error }) {
+export function done({ goal, rays, error, seconds }) {
     if (goal === null) return null;
-    const share = "rays" in goal ? rays / goal.rays : (goal.error / error) ** 2;
+    let share;
+    if ("rays" in goal) share = rays / goal.rays;
+    else if ("error" in goal) share = (goal.error / error) ** 2;
+    else share = seconds / goal.seconds;
     return Number.isFinite(share) ? Math.min(Math.max(share, 0), 1) : 0;
 }
 
 /** @param {Status["goal"]} goal */
 function goalText(goal) {
     if (goal === null) return "";
+    if ("seconds" in goal) return `${count(goal.seconds)} seconds`;
     return "rays" in goal ? `${count(goal.rays)} rays` : `an error of ${percent(goal.error)}`;
 }

@@ -1,7 +1,6 @@
 // From poses to matrices.
 
-/** @typedef {import("twinray/walk.js").Walk} Walk */
-/** @typedef {import("twinray/walk.js").Pose} Pose */
+/** @import { Pose, Walk } from "twinray/types.js" */
 
 /** The near plane over the scene's radius. */
 const NEAR = 0.0015;

@@ -14,20 +14,7 @@ import {
     SURFACE_VERTEX,
 } from "twinray/shaders.js";
 
-/** @typedef {import("twinray/walk.js").Walk} Walk */
-/** @typedef {import("twinray/walk.js").Pose} Pose */
-/** @typedef {import("twinray/walk.js").Container} Container */
-
-/**
- * @typedef {object} Options
- * @property {number|null} exposure EV; null: automatic
- * @property {"agx"|"aces"|"reinhard"|"none"} curve
- * @property {boolean} falseColour
- * @property {number[]|null} range of false colour; null: automatic
- * @property {boolean} logarithmic
- * @property {boolean} cells show the cells
- * @property {Uint8Array|null} colours 256 colours, RGBA
- */
+/** @import { Container, FrameInfo, Options, Pick, Pose, Vec3, Walk } from "twinray/types.js" */
 
 /** Frames of which a resting view is the mean. */
 const FRAMES = 48;
@@ -45,8 +32,8 @@ const METER = 48;
 const CURVES = ["agx", "aces", "reinhard", "none"];
 
 export class Renderer {
-    /** Called after every frame. @type {(info: {exposure: number, samples: number, illuminanceRange: number[]}) => void} */
-    onframe = () => {};
+    /** Called after every frame. @type {((info: FrameInfo) => void)|null} */
+    onframe = null;
     /** @type {Options} */
     options = {
         exposure: null,
@@ -55,7 +42,7 @@ export class Renderer {
         range: null,
         logarithmic: false,
         cells: false,
-        colours: null,
+        colours: new Uint8Array(4 * 256),
     };
 
     /** @type {Pose|null} */
@@ -74,7 +61,7 @@ export class Renderer {
     #lastFrame = 0;
     /** Whether the next frame was asked for by this one. */
     #follows = false;
-    /** @type {number[]} */
+    /** @type {[number, number]} */
     #range = [0, 1];
     #hasLight = false;
     #disposed = false;
@@ -92,7 +79,9 @@ export class Renderer {
         });
         if (!gl) throw new Error("this browser has no WebGL 2, which the walk-through draws with");
         if (!gl.getExtension("EXT_color_buffer_float")) {
-            throw new Error("this graphics processor cannot draw into floating-point pictures (EXT_color_buffer_float)");
+            throw new Error(
+                "this graphics processor cannot draw into floating-point pictures (EXT_color_buffer_float)",
+            );
         }
         this.canvas = canvas;
         this.walk = walk;
@@ -202,13 +191,20 @@ export class Renderer {
      * What lies under a point of the canvas.
      * @param {number} x in CSS pixels
      * @param {number} y
+     * @returns {Promise<Pick|null>}
      */
     async pick(x, y) {
         const { gl, canvas, walk, resources } = this;
         if (!this.#view) return null;
         const [width, height] = [canvas.clientWidth, canvas.clientHeight];
         const at = [(2 * (x + 0.5)) / width - 1, 1 - (2 * (y + 0.5)) / height];
-        const { viewProjection } = matrices(this.#view, width / height, walk, at.map((c) => -c), [width, height]);
+        const { viewProjection } = matrices(
+            this.#view,
+            width / height,
+            walk,
+            at.map((c) => -c),
+            [width, height],
+        );
         gl.bindFramebuffer(gl.FRAMEBUFFER, this.picked.framebuffer);
         gl.viewport(0, 0, 1, 1);
         gl.clearBufferuiv(gl.COLOR, 0, [0, 0, 0, 0]);
@@ -298,7 +294,7 @@ export class Renderer {
         const settled = this.#meter(moving);
         this.#coarse = coarse;
         this.#show();
-        this.onframe({ exposure: this.exposure, samples: this.#frames, illuminanceRange: this.#range });
+        this.onframe?.({ exposure: this.exposure, samples: this.#frames, illuminanceRange: this.#range });
         if (coarse < 1 || !settled || this.#frames < (this.#slow ? FEW_FRAMES : FRAMES)) {
             this.#follows = true;
             this.#request();
@@ -487,6 +483,7 @@ export class Renderer {
     /**
      * @param {number} x share of the width
      * @param {number} y share of the height, from below
+     * @returns {Vec3}
      */
     #radianceAt(x, y) {
         const { gl, canvas, means } = this;
@@ -501,7 +498,8 @@ export class Renderer {
         });
         gl.readBuffer(gl.COLOR_ATTACHMENT0);
         const share = this.#updates / (this.#updates + PRIOR);
-        return [0, 1, 2].map((k) => (sums[0][k] + share * sums[1][k]) / this.#baked);
+        const of = (/** @type {number} */ k) => (sums[0][k] + share * sums[1][k]) / this.#baked;
+        return [of(0), of(1), of(2)];
     }
 }
 

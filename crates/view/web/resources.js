@@ -1,7 +1,6 @@
 // What the graphics processor holds of a scene: vertices, records, materials, textures, and the light, which changes.
 
-/** @typedef {import("twinray/walk.js").Walk} Walk */
-/** @typedef {import("twinray/walk.js").Container} Container */
+/** @import { Container, Walk } from "twinray/types.js" */
 
 /** Texels in a row of data textures. */
 export const ROW = 2048;
@@ -280,7 +279,17 @@ class Images {
         const { gl } = this;
         const texture = gl.createTexture();
         gl.bindTexture(gl.TEXTURE_2D, texture);
-        gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([255, 255, 255, 255]));
+        gl.texImage2D(
+            gl.TEXTURE_2D,
+            0,
+            gl.RGBA8,
+            1,
+            1,
+            0,
+            gl.RGBA,
+            gl.UNSIGNED_BYTE,
+            new Uint8Array([255, 255, 255, 255]),
+        );
         this.textures.set(key, texture);
         this.pending.push(this.#load(texture, slot));
         return texture;

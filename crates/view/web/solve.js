@@ -42,7 +42,7 @@ export class Solve {
         }
     }
 
-    #onLight = (/** @type {unknown} */ light) => {
+    #onLight = (/** @type {import("twinray/types.js").Container} */ light) => {
         this.#renderer.setLight(light);
         const now = performance.now();
         if (this.#readings.count === 0 || now - this.#refreshed < REFRESH_MILLISECONDS) return;

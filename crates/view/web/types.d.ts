@@ -36,6 +36,16 @@ export interface Walk {
     materials: { name: string }[];
     stats: { triangles: number; cells: number; rays: number; error: number };
     generator: string;
+    /** Surfaces, materials and pictures, for the renderer. */
+    scene: Container;
+    /** The light of an exported walk. */
+    light: Container | null;
+}
+
+/** A header and the arrays that it names, as `walk.js` reads them. */
+export interface Container {
+    header: Record<string, any>;
+    arrays: Record<string, Uint8Array | Int8Array | Int16Array | Uint16Array | Uint32Array | Float32Array>;
 }
 
 export type Curve = "agx" | "aces" | "reinhard" | "none";
@@ -92,7 +102,7 @@ export interface Status {
     rate: number;
     error: number;
     seconds: number;
-    goal: { rays: number } | { error: number } | null;
+    goal: { rays: number } | { error: number } | { seconds: number } | null;
     message?: string;
 }
 
@@ -102,7 +112,7 @@ export interface RendererLike {
     setOptions(options: Partial<Options>): void;
     readonly options: Options;
     readonly exposure: number;
-    setLight(light: unknown): void;
+    setLight(light: Container): void;
     pick(x: number, y: number): Promise<Pick | null>;
     screenshot(): Promise<Blob>;
     resize(): void;

@@ -1,36 +1,6 @@
 // The package of a scene, and containers of light: bytes to typed arrays. See crates/view/src/container.rs.
 
-/** @typedef {Record<string, any>} Header */
-/** @typedef {Uint8Array|Int8Array|Int16Array|Uint16Array|Uint32Array|Float32Array} Numbers */
-/** @typedef {{ header: Header, arrays: Record<string, Numbers> }} Container */
-
-/**
- * @typedef {object} Pose
- * @property {number[]} eye in page coordinates, metres
- * @property {number[]} forward unit vector
- * @property {number[]} up unit vector
- * @property {number} fov vertical field of view, radians
- */
-
-/**
- * What is known of a scene, whatever its light.
- * @typedef {object} Walk
- * @property {string} name
- * @property {string} generator
- * @property {boolean} live whether a server brings light
- * @property {string} base URL of the server's folder
- * @property {number[]} up
- * @property {number[]} centre scene coordinates are page coordinates plus this
- * @property {number} radius
- * @property {number[][]} bounds
- * @property {(Pose & {name: string})[]} cameras
- * @property {Pose} home
- * @property {{name: string, factor: number}} unit of illuminance
- * @property {{name: string}[]} materials
- * @property {{triangles: number, cells: number, nodes: number, rays: number, error: number}} stats
- * @property {Container} scene
- * @property {Container|null} light of an exported walk
- */
+/** @import { Container, Pose, Vec3, Walk } from "twinray/types.js" */
 
 const MAGIC = "twinwalk";
 const TYPES = {
@@ -53,7 +23,7 @@ export function readContainer(buffer) {
     if (magic !== MAGIC) throw new Error("these bytes are no walk-through");
     const length = new DataView(buffer).getUint32(8, true);
     const header = JSON.parse(new TextDecoder().decode(bytes.subarray(16, 16 + length)));
-    /** @type {Record<string, Numbers>} */
+    /** @type {Container["arrays"]} */
     const arrays = {};
     for (const [name, place] of Object.entries(header.arrays)) {
         const { type, offset, length: count } = /** @type {any} */ (place);
@@ -103,14 +73,14 @@ function describe(scene, light) {
 
 /**
  * A view of everything, for scenes without a camera.
- * @param {number[][]} bounds
+ * @param {[Vec3, Vec3]} bounds
  * @returns {Pose}
  */
 function overview([low, high]) {
-    const middle = low.map((x, k) => 0.5 * (x + high[k]));
     const size = Math.hypot(...low.map((x, k) => high[k] - x));
-    const forward = [-0.5, -0.35, -0.8].map((x) => x / Math.hypot(0.5, 0.35, 0.8));
-    return { eye: middle.map((x, k) => x - 0.9 * size * forward[k]), forward, up: [0, 1, 0], fov: 0.8 };
+    const forward = /** @type {Vec3} */ ([-0.5, -0.35, -0.8].map((x) => x / Math.hypot(0.5, 0.35, 0.8)));
+    const eye = /** @type {Vec3} */ (low.map((x, k) => 0.5 * (x + high[k]) - 0.9 * size * forward[k]));
+    return { eye, forward, up: [0, 1, 0], fov: 0.8 };
 }
 
 /**

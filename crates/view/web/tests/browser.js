@@ -17,9 +17,19 @@ const BINARY =
     ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
 
 export async function launch() {
-    if (!BINARY) throw new Error("no chromium found; name one in CHROMIUM");
     const server = await serve();
-    const browser = await puppeteer.launch({
+    const chromium = await browser();
+    const close = async () => {
+        await chromium.close();
+        server.close();
+    };
+    return { browser: chromium, url: server.url, close };
+}
+
+/** A browser without a page. */
+export async function browser() {
+    if (!BINARY) throw new Error("no chromium found; name one in CHROMIUM");
+    return puppeteer.launch({
         executablePath: BINARY,
         headless: true,
         args: [
@@ -30,11 +40,6 @@ export async function launch() {
             "--ignore-gpu-blocklist",
         ],
     });
-    const close = async () => {
-        await browser.close();
-        server.close();
-    };
-    return { browser, url: server.url, close };
 }
 
 /**

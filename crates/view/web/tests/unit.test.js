@@ -143,6 +143,8 @@ const WALK = {
     materials: [],
     stats: { triangles: 0, cells: 0, rays: 0, error: 0 },
     generator: "",
+    scene: { header: {}, arrays: {} },
+    light: null,
 };
 
 test("a link brings back pose and settings", () => {

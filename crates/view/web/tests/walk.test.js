@@ -1,0 +1,389 @@
+/**
+ * The whole walk: `twinray view` and exported files in a browser, their pictures against those of `twinray render`. `TWINRAY`
+ * names the command.
+ */
+
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { request } from "node:http";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { pathToFileURL } from "node:url";
+
+import { browser as start, wait } from "./browser.js";
+
+/** @import { Browser, Page } from "puppeteer-core" */
+/** @import { ChildProcess } from "node:child_process" */
+
+const COMMAND = process.env.TWINRAY ?? "";
+const skip = existsSync(COMMAND) ? false : "TWINRAY names no command";
+/** Where pictures are kept to be looked at. */
+const PICTURES = join(import.meta.dirname, "pictures");
+/** How far the mean of a diffuse scene may be from that of `render`. */
+const MEAN = 0.03;
+const TOKEN = "0123456789abcdefghij";
+
+/** @type {Browser} */
+let browser;
+/** @type {string} */
+let folder;
+/** @type {Set<ChildProcess>} */
+const servers = new Set();
+before(async () => {
+    if (skip) return;
+    mkdirSync(PICTURES, { recursive: true });
+    folder = mkdtempSync(join(tmpdir(), "twinray-walk-"));
+    browser = await start();
+});
+after(async () => {
+    servers.forEach((server) => server.kill("SIGKILL"));
+    await browser?.close();
+    if (folder) rmSync(folder, { recursive: true });
+});
+
+/** @param {string[]} args */
+const run = (...args) =>
+    execFileSync(COMMAND, [...args, "--quiet"], { cwd: folder, stdio: ["ignore", "pipe", "pipe"] });
+
+/**
+ * Starts `twinray view` and waits for its address.
+ * @param {string[]} args
+ * @returns {Promise<{url: string, server: ChildProcess}>}
+ */
+async function view(...args) {
+    const server = spawn(COMMAND, ["view", ...args, "--quiet"], { cwd: folder, stdio: ["ignore", "pipe", "inherit"] });
+    servers.add(server);
+    server.on("exit", () => servers.delete(server));
+    const url = await new Promise((done, fail) => {
+        let text = "";
+        server.stdout.on("data", (/** @type {Buffer} */ data) => {
+            text += data;
+            if (text.includes("\n")) done(text.trim());
+        });
+        server.on("exit", (code) => fail(new Error(`twinray view ended with ${code}`)));
+    });
+    return { url, server };
+}
+
+/**
+ * A page and what it complained of. Requests go to `url` or nowhere.
+ * @param {string} url
+ * @param {{width?: number, height?: number}} [size]
+ */
+async function open(url, { width = 800, height = 480 } = {}) {
+    const page = await browser.newPage();
+    /** @type {string[]} */
+    const complaints = [];
+    page.on("console", (message) => {
+        // Software drivers call reading a pixel slow.
+        if (["error", "warn"].includes(message.type()) && !message.text().includes("GL Driver Message"))
+            complaints.push(message.text());
+    });
+    page.on("pageerror", (error) => complaints.push(String(error)));
+    page.on("request", (r) => {
+        if (!/^(data|blob):/.test(r.url()) && !r.url().startsWith(url.replace(/#.*/, "")))
+            complaints.push(`asks for ${r.url()}`);
+    });
+    await page.setViewport({ width, height });
+    await page.emulateMediaFeatures([{ name: "prefers-reduced-motion", value: "reduce" }]);
+    await page.goto(url);
+    await page.waitForFunction("window.twinray?.renderer.state.frames > 0", { timeout: 60_000 });
+    return { page, complaints };
+}
+
+/** Until the view rests. @param {Page} page */
+const rested = (page) =>
+    page.waitForFunction("window.twinray.renderer.state.resting && window.twinray.renderer.state.frames > 7", {
+        timeout: 120_000,
+    });
+
+/** Until the solver has finished and the page has its light. @param {Page} page */
+async function finished(page) {
+    await page.waitForFunction("document.querySelector('#solve-state').textContent.includes('Finished')", {
+        timeout: 120_000,
+    });
+    await wait(1500);
+}
+
+/**
+ * The page's picture as the shader makes it, without panels, and its size.
+ * @param {Page} page
+ * @param {Record<string, unknown>} options
+ * @param {string} name
+ */
+async function picture(page, options, name) {
+    const size = await page.evaluate((o) => {
+        const { renderer } = /** @type {any} */ (globalThis).twinray;
+        renderer.setOptions(o);
+        return [renderer.canvas.width, renderer.canvas.height];
+    }, options);
+    await rested(page);
+    const base64 = await page.evaluate(async () => {
+        const { renderer } = /** @type {any} */ (globalThis).twinray;
+        const bytes = new Uint8Array(await (await renderer.screenshot()).arrayBuffer());
+        return btoa(Array.from(bytes, (b) => String.fromCharCode(b)).join(""));
+    });
+    writeFileSync(join(PICTURES, `${name}.png`), Buffer.from(base64, "base64"));
+    return { size: size.join("x"), base64 };
+}
+
+/**
+ * Means of two PNG files' linear channels where neither is at its end, and their RMS difference over the mean.
+ * @param {string} a base64
+ * @param {string} b base64
+ * @returns {Promise<{ratio: number[], rms: number}>}
+ */
+async function compared(a, b) {
+    const page = await browser.newPage();
+    try {
+        return await page.evaluate(
+            async (files) => {
+                const [x, y] = await Promise.all(
+                    files.map(async (file) => {
+                        const bytes = Uint8Array.from(atob(file), (c) => c.charCodeAt(0));
+                        const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }), {
+                            colorSpaceConversion: "none",
+                        });
+                        const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+                        const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d"));
+                        context.drawImage(bitmap, 0, 0);
+                        return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+                    }),
+                );
+                if (x.length !== y.length) throw new Error(`pictures of ${x.length / 4} and ${y.length / 4} pixels`);
+                const linear = (/** @type {number} */ c) =>
+                    c <= 0.04045 * 255 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4;
+                const sums = [
+                    [0, 0, 0],
+                    [0, 0, 0],
+                ];
+                let [square, all] = [0, 0];
+                for (let i = 0; i < x.length; i += 4) {
+                    if (Math.max(x[i], x[i + 1], x[i + 2], y[i], y[i + 1], y[i + 2]) > 250) continue;
+                    for (let k = 0; k < 3; k++) {
+                        const [p, q] = [linear(x[i + k]), linear(y[i + k])];
+                        sums[0][k] += p;
+                        sums[1][k] += q;
+                        square += (p - q) ** 2;
+                        all += 1;
+                    }
+                }
+                const mean = (sums[1][0] + sums[1][1] + sums[1][2]) / all;
+                return { ratio: sums[0].map((s, k) => s / sums[1][k]), rms: Math.sqrt(square / all) / mean };
+            },
+            [a, b],
+        );
+    } finally {
+        await page.close();
+    }
+}
+
+test("a scene is lit while it is solved, can be paused, and ends as `render` shows it", { skip }, async () => {
+    const { url, server } = await view("cornell", "--patches", "10k", "--rays", "12M", "--token", TOKEN);
+    const { page, complaints } = await open(url);
+    /** @type {() => Promise<any>} */
+    const status = () => page.evaluate(async () => (await fetch("status")).json());
+    const early = await status();
+    assert.ok(["solving", "finished"].includes(early.state), early.state);
+    await page.evaluate("window.twinray.live.pause()");
+    await wait(700);
+    const paused = await status();
+    if (paused.state !== "finished") {
+        assert.equal(paused.state, "paused");
+        await wait(500);
+        assert.equal((await status()).rays, paused.rays, "a paused solver shoots nothing");
+        await page.evaluate("window.twinray.live.resume()");
+    }
+    await finished(page);
+    assert.ok((await status()).rays >= 12e6);
+
+    const { size, base64 } = await picture(page, { exposure: 2, curve: "none" }, "cornell");
+    server.kill("SIGINT");
+    run("solve", "cornell", "--patches", "10k", "--rays", "12M", "-o", "cornell.twin");
+    const how = ["--method", "patches", "--exposure", "2", "--tone", "none", "--size", size];
+    run("render", "cornell.twin", ...how, "-o", "cornell.png");
+    const { ratio, rms } = await compared(base64, readFileSync(join(folder, "cornell.png"), "base64"));
+    assert.ok(
+        ratio.every((r) => Math.abs(r - 1) < MEAN),
+        `means differ by ${ratio}`,
+    );
+    assert.ok(rms < 0.08, `pictures differ by ${rms}`);
+    // The server is gone, which is no error of the page's own.
+    assert.deepEqual(
+        complaints.filter((c) => !c.includes("ERR_CONNECTION_REFUSED")),
+        [],
+    );
+    await page.close();
+});
+
+test("a point says its illuminance, which is that of the solution", { skip }, async () => {
+    run("solve", "plates", "--rays", "4M", "-o", "plates.twin");
+    const { url, server } = await view("plates.twin");
+    const { page, complaints } = await open(url);
+    await finished(page);
+    await rested(page);
+    const size = /** @type {number[]} */ (
+        await page.evaluate(
+            "[document.querySelector('canvas').clientWidth, document.querySelector('canvas').clientHeight]",
+        )
+    );
+    const found = [];
+    for (let i = 1; i < 8; i++) {
+        for (let j = 1; j < 8; j++) {
+            const at = [(size[0] * i) / 8, (size[1] * j) / 8];
+            const pick = await page.evaluate(
+                async ([x, y]) => /** @type {any} */ (globalThis).twinray.renderer.pick(x, y),
+                at,
+            );
+            if (pick) found.push(pick);
+        }
+    }
+    assert.ok(found.length > 3, "the scene is in the picture");
+    run("export", "plates.twin", "-o", "plates.csv");
+    const lines = readFileSync(join(folder, "plates.csv"), "utf8").trim().split("\n");
+    const names = lines[0].split(",");
+    const column = (/** @type {string} */ name) => names.findIndex((n) => n === name);
+    const [x, y, z] = ["x", "y", "z"].map((axis) => names.findIndex((n) => n.endsWith(`_${axis}`) || n === axis));
+    const e = ["r", "g", "b"].map((c) => column(`irradiance_${c}`));
+    assert.ok(
+        [x, y, z, ...e].every((k) => k >= 0),
+        lines[0],
+    );
+    const centre = /** @type {number[]} */ (await page.evaluate("window.twinray.walk.centre"));
+    const cells = lines.slice(1).map((line) => line.split(",").map(Number));
+    for (const pick of found) {
+        const point = pick.point.map((/** @type {number} */ c, /** @type {number} */ k) => c + centre[k]);
+        const far = (/** @type {number[]} */ cell) =>
+            Math.hypot(cell[x] - point[0], cell[y] - point[1], cell[z] - point[2]);
+        const cell = cells.reduce((a, b) => (far(b) < far(a) ? b : a));
+        const expected = 0.2126 * cell[e[0]] + 0.7152 * cell[e[1]] + 0.0722 * cell[e[2]];
+        // The page is smooth between cells, whose own light is noisy.
+        const room = (0.05 + 5 * (pick.error || 0)) * expected + 1e-6;
+        assert.ok(Math.abs(pick.illuminance - expected) < room, `${pick.illuminance}, the cell has ${expected}`);
+        if (expected > 0) assert.ok(pick.error > 0 && pick.error < 1, `its error is ${pick.error}`);
+    }
+    assert.deepEqual(complaints, []);
+    server.kill("SIGINT");
+    await page.close();
+});
+
+test("a killed server leaves the light, and a restarted one is found again", { skip }, async () => {
+    const args = ["cornell", "--patches", "4k", "--rays", "1M", "--token", TOKEN];
+    const first = await view(...args);
+    const port = new URL(first.url).port;
+    const { page } = await open(first.url);
+    await finished(page);
+    first.server.kill("SIGKILL");
+    const state = "document.querySelector('#solve-state').textContent";
+    await page.waitForFunction(`!${state}.includes('Finished')`, { timeout: 20_000 });
+    assert.match(String(await page.evaluate(state)), /lost/i);
+    assert.ok(await page.evaluate("window.twinray.renderer.state.frames > 0"), "the picture stays");
+    const second = await view(...args, "--port", port);
+    assert.equal(second.url, first.url);
+    await page.waitForFunction(`${state}.includes('Finished')`, { timeout: 30_000 });
+    second.server.kill("SIGINT");
+    await page.close();
+});
+
+test("the server answers its own page alone", { skip }, async () => {
+    const { url, server } = await view("plates", "--rays", "100k");
+    const { port, pathname } = new URL(url);
+    const ask = (/** @type {string} */ path, headers = {}, method = "GET") =>
+        new Promise((done, fail) => {
+            const asked = request({ host: "127.0.0.1", port, path, method, headers }, (answer) => {
+                answer.resume();
+                done(answer.statusCode);
+            });
+            asked.on("error", fail);
+            asked.end();
+        });
+    assert.equal(await ask(pathname), 200);
+    assert.equal(await ask(`${pathname}scene`), 200);
+    assert.equal(await ask("/"), 403, "without the token");
+    assert.equal(await ask(`/${"0".repeat(32)}/`), 403, "with another token");
+    assert.equal(await ask(pathname, { host: `elsewhere.example:${port}` }), 403, "by another name");
+    assert.equal(await ask(`${pathname}pause`, { origin: "http://elsewhere.example" }, "POST"), 403, "from elsewhere");
+    assert.equal(await ask(`${pathname}status`, { "sec-fetch-site": "cross-site" }), 403, "from another site");
+    assert.equal(await ask(`${pathname}../Cargo.toml`), 404, "no files of the disk");
+    assert.equal(await ask(`${pathname}pause`), 404, "nothing changes by looking");
+    server.kill("SIGINT");
+});
+
+test("an exported file opens from the disk, shows what `render` shows, and rests", { skip }, async () => {
+    run("solve", "hall-diffuse", "--patches", "20k", "--rays", "6M", "-o", "hall.twin");
+    run("export", "hall.twin", "-o", "hall.html");
+    const { page, complaints } = await open(pathToFileURL(join(folder, "hall.html")).href);
+    const { size, base64 } = await picture(page, { exposure: -6, curve: "none" }, "hall");
+    const how = ["--method", "patches", "--exposure=-6", "--tone", "none", "--size", size];
+    run("render", "hall.twin", ...how, "-o", "hall.png");
+    const { ratio, rms } = await compared(base64, readFileSync(join(folder, "hall.png"), "base64"));
+    assert.ok(
+        ratio.every((r) => Math.abs(r - 1) < MEAN),
+        `means differ by ${ratio}`,
+    );
+    assert.ok(rms < 0.15, `pictures differ by ${rms}`);
+
+    // Nothing runs while nothing moves; a step of the camera draws again.
+    await page.evaluate(() => {
+        const global = /** @type {any} */ (globalThis);
+        const asked = global.requestAnimationFrame.bind(global);
+        global.asked = 0;
+        global.requestAnimationFrame = (/** @type {FrameRequestCallback} */ f) => {
+            global.asked += 1;
+            return asked(f);
+        };
+    });
+    await wait(1500);
+    assert.equal(await page.evaluate("globalThis.asked"), 0, "a resting page draws nothing");
+    const before = await page.evaluate("JSON.stringify(window.twinray.camera.pose.eye)");
+    await page.evaluate("document.querySelector('canvas').focus()");
+    await page.keyboard.down("w");
+    await wait(1200);
+    await page.keyboard.up("w");
+    await rested(page);
+    assert.notEqual(await page.evaluate("JSON.stringify(window.twinray.camera.pose.eye)"), before, "W walks");
+    await page.screenshot({ path: join(PICTURES, "hall-page.png") });
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
+
+test(
+    "glossy floors change with the eye, and false colours have their legend, on a small screen too",
+    { skip },
+    async () => {
+        run("solve", "hall", "--patches", "20k", "--rays", "4M", "-o", "glossy.twin");
+        run("export", "glossy.twin", "-o", "glossy.html");
+        const { page, complaints } = await open(pathToFileURL(join(folder, "glossy.html")).href, {
+            width: 360,
+            height: 640,
+        });
+        const { base64 } = await picture(page, { exposure: -6, curve: "none" }, "glossy");
+        const { size } = await picture(page, { exposure: -6, curve: "none" }, "glossy");
+        run(
+            "render",
+            "glossy.twin",
+            "--method",
+            "gather",
+            "--spp",
+            "16",
+            "--exposure=-6",
+            "--tone",
+            "none",
+            "--size",
+            size,
+            "-o",
+            "g.png",
+        );
+        assert.ok(base64.length > 1000);
+        await page.keyboard.press("l");
+        await page.evaluate("window.twinray.renderer.setOptions({ falseColour: true })");
+        await rested(page);
+        await page.screenshot({ path: join(PICTURES, "false-colour.png") });
+        const wide = await page.evaluate("document.documentElement.scrollWidth <= innerWidth");
+        assert.ok(wide, "nothing is wider than the screen");
+        assert.deepEqual(complaints, []);
+        await page.close();
+    },
+);
