@@ -1,5 +1,5 @@
 //! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`; `cargo xtask bench`;
-//! `cargo xtask sanitize`, `cargo xtask mpi`. No tool has to be installed beside Rust itself, but for these two.
+//! `cargo xtask sanitize`, `cargo xtask mpi`. No tool has to be installed beside Rust itself, but for these two and `web`.
 //!
 //! One line a step; the first step that fails ends the run and is named. `structure` holds the checks that need no
 //! compiler, which are tests of this crate as well.
@@ -25,6 +25,11 @@ const STEPS: &[Step] = &[
         "mpi",
         "ranks of an MPI, installed where it is missing, give the bits of one process: [RAYS [SCENE:PATCHES...]]",
         mpi,
+    ),
+    (
+        "web",
+        "the walk-through's page: format, types, tests in a browser; Node and Chromium are installed where missing",
+        web,
     ),
 ];
 
@@ -115,6 +120,10 @@ fn mpi() -> Result<(), String> {
     let there = ["--manifest-path", "mpi/Cargo.toml"];
     run(cargo().arg("fmt").args(there).arg("--check"))?;
     run(cargo().args(["clippy", "--quiet", "--release", "--all-targets"]).args(there).args(["--", "-D", "warnings"]))
+}
+
+fn web() -> Result<(), String> {
+    run(Command::new("bash").arg("crates/view/web/check.sh").current_dir(structure::root()))
 }
 
 fn deps() -> Result<(), String> {

@@ -366,7 +366,8 @@ void main() {
     vec2 uv = vec2(atan(d.x, -d.z) / 6.283185307179586 + 0.5, acos(clamp(d.y, -1.0, 1.0)) / 3.141592653589793);
     vec3 c = textureLod(uSky, uv, 0.0).rgb * uScale.x;
     c *= min(1.0, 12.0 / max(max(c.r, c.g), max(c.b, 1e-20)));
-    oKnown = vec4(uScale.y > 0.5 ? vec3(-1.0) : c, 1.0);
+    /* In false colour what is seen counts by its share of a pixel. */
+    oKnown = uScale.y > 0.5 ? vec4(0.0) : vec4(c, 1.0);
     oSampled = vec4(0.0);
 }`;
 
@@ -454,10 +455,11 @@ vec3 aces(vec3 c) {
     return outward * v / (outward * vec3(1.0));
 }
 void main() {
-    vec3 c = texture(uKnown, vFilm * uPart).rgb;
+    vec4 known = texture(uKnown, vFilm * uPart);
+    vec3 c = known.rgb;
     if (uCurve == 4) {
-        if (c.r < 0.0) { oColor = vec4(0.1, 0.1, 0.11, 1.0); return; }
-        float x = c.r * uGain;
+        if (known.a < 0.5) { oColor = vec4(0.1, 0.1, 0.11, 1.0); return; }
+        float x = c.r / known.a * uGain;
         float t = uRange.z > 0.5 ? log(max(x, 1e-20) / uRange.x) / log(uRange.y / uRange.x) : (x - uRange.x) / (uRange.y - uRange.x);
         oColor = vec4(texture(uColours, vec2((clamp(t, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5)).rgb, 1.0);
         return;

@@ -8,9 +8,9 @@ import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { request } from "node:http";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
-import { pathToFileURL } from "node:url";
+import { fileURLToPath, pathToFileURL } from "node:url";
 
 import { browser as start, wait } from "./browser.js";
 
@@ -20,7 +20,7 @@ import { browser as start, wait } from "./browser.js";
 const COMMAND = process.env.TWINRAY ?? "";
 const skip = existsSync(COMMAND) ? false : "TWINRAY names no command";
 /** Where pictures are kept to be looked at. */
-const PICTURES = join(import.meta.dirname, "pictures");
+const PICTURES = join(dirname(fileURLToPath(import.meta.url)), "pictures");
 /** How far the mean of a diffuse scene may be from that of `render`. */
 const MEAN = 0.03;
 const TOKEN = "0123456789abcdefghij";
@@ -349,41 +349,26 @@ test("an exported file opens from the disk, shows what `render` shows, and rests
     await page.close();
 });
 
-test(
-    "glossy floors change with the eye, and false colours have their legend, on a small screen too",
-    { skip },
-    async () => {
-        run("solve", "hall", "--patches", "20k", "--rays", "4M", "-o", "glossy.twin");
-        run("export", "glossy.twin", "-o", "glossy.html");
-        const { page, complaints } = await open(pathToFileURL(join(folder, "glossy.html")).href, {
-            width: 360,
-            height: 640,
-        });
-        const { base64 } = await picture(page, { exposure: -6, curve: "none" }, "glossy");
-        const { size } = await picture(page, { exposure: -6, curve: "none" }, "glossy");
-        run(
-            "render",
-            "glossy.twin",
-            "--method",
-            "gather",
-            "--spp",
-            "16",
-            "--exposure=-6",
-            "--tone",
-            "none",
-            "--size",
-            size,
-            "-o",
-            "g.png",
-        );
-        assert.ok(base64.length > 1000);
-        await page.keyboard.press("l");
-        await page.evaluate("window.twinray.renderer.setOptions({ falseColour: true })");
-        await rested(page);
-        await page.screenshot({ path: join(PICTURES, "false-colour.png") });
-        const wide = await page.evaluate("document.documentElement.scrollWidth <= innerWidth");
-        assert.ok(wide, "nothing is wider than the screen");
-        assert.deepEqual(complaints, []);
-        await page.close();
-    },
-);
+test("a glossy hall is as bright as `render` has it, and false colours fit a small screen", { skip }, async () => {
+    run("solve", "hall", "--patches", "20k", "--rays", "4M", "-o", "glossy.twin");
+    run("export", "glossy.twin", "-o", "glossy.html");
+    const screen = { width: 360, height: 640 };
+    const { page, complaints } = await open(pathToFileURL(join(folder, "glossy.html")).href, screen);
+    const { size, base64 } = await picture(page, { exposure: -6, curve: "none" }, "glossy");
+    const how = ["--method", "gather", "--spp", "8", "--exposure=-6", "--tone", "none", "--size", size];
+    // The page shows the width of the camera's picture in an upright window.
+    const fov = await page.evaluate("(window.twinray.camera.view.fov * 180) / Math.PI");
+    run("render", "glossy.twin", ...how, "--fov", String(fov), "-o", "glossy.png");
+    const { ratio } = await compared(base64, readFileSync(join(folder, "glossy.png"), "base64"));
+    // Harmonics blur what floors reflect: their mean is right, and no bound is known for a view.
+    assert.ok(
+        ratio.every((r) => Math.abs(r - 1) < 0.06),
+        `means differ by ${ratio}`,
+    );
+    await page.keyboard.press("l");
+    await rested(page);
+    await page.screenshot({ path: join(PICTURES, "false-colour.png") });
+    assert.ok(await page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is too wide");
+    assert.deepEqual(complaints, []);
+    await page.close();
+});

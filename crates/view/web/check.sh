@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Checks of the walk-through's page: format, types, and tests in a browser of the page alone and of whole walks. Installs
+# Node and Chromium where they are missing (Debian's packages), and the tools of package-lock.json.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+missing=()
+command -v node >/dev/null && command -v npm >/dev/null || missing+=(nodejs npm)
+command -v chromium >/dev/null || [ -n "${CHROMIUM:-}" ] || missing+=(chromium)
+if [ ${#missing[@]} -gt 0 ]; then
+    echo "web: installing ${missing[*]}"
+    sudo=""
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    $sudo apt-get update -q
+    DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -q --no-install-recommends "${missing[@]}"
+fi
+
+npm ci --no-audit --no-fund --loglevel=error
+npm run --silent lint
+npm run --silent types
+
+# The command that the page is in.
+root=$(cd ../../.. && pwd)
+target=$(cd "$root" && cargo metadata --format-version 1 --no-deps | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+(cd "$root" && cargo build --quiet --release --package twinray-cli)
+TWINRAY="$target/release/twinray" npm run --silent test
