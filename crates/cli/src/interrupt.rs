@@ -1,12 +1,26 @@
 //! Ctrl-C and SIGTERM: the first asks to stop at the end of the wave and keep the result, the second stops at once.
 
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 
 /// The signal that asked to stop; 0 for none.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
 const SAID: &str =
     "\nstopping at the end of this wave or pass; what there is will be written (the same again stops at once)";
+
+/// Whether nothing is at stake: ending is what a signal is for.
+static EXPECTED: AtomicBool = AtomicBool::new(false);
+
+/// From now on a signal is the usual end, and nothing is said of it.
+pub fn expect() {
+    EXPECTED.store(true, Ordering::SeqCst);
+}
+
+fn say() {
+    if !EXPECTED.load(Ordering::SeqCst) {
+        crate::say!("{SAID}");
+    }
+}
 
 /// Installs the handlers.
 #[cfg(unix)]
@@ -22,7 +36,7 @@ pub fn install() {
                 crate::output::abandon();
                 std::process::exit(exit_code(signal).into());
             }
-            crate::say!("{SAID}");
+            say();
         }
     });
 }
@@ -39,7 +53,6 @@ fn is_ignored(signal: i32) -> bool {
 #[cfg(not(unix))]
 pub fn install() {
     use std::sync::Arc;
-    use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
     use signal_hook::consts::SIGINT;
@@ -55,7 +68,7 @@ pub fn install() {
                     crate::output::abandon();
                     std::process::exit(exit_code(SIGINT).into());
                 }
-                crate::say!("{SAID}");
+                say();
             }
         }
     });

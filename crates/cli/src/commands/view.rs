@@ -53,6 +53,10 @@ pub fn run(args: &ViewerArgs) -> anyhow::Result<Ending> {
     };
     commands::set_threads(args.load.threads);
     interrupt::install();
+    if args.output.is_none() {
+        // What would be written is nothing.
+        interrupt::expect();
+    }
     let is_stored = stored::is_solution(&args.load.scene);
     if is_stored && (args.solve.rays.is_some() || args.solve.time.is_some() || args.solve.error.is_some()) {
         let name = &args.load.scene;
@@ -85,6 +89,7 @@ pub fn run(args: &ViewerArgs) -> anyhow::Result<Ending> {
         true => show(args, &loaded, &mut sender)?,
         false => solve(args, &loaded, &mut sender, output)?,
     }
+    interrupt::expect();
     while !interrupt::requested() {
         std::thread::sleep(REST);
     }

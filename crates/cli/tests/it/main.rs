@@ -21,3 +21,4 @@ mod reproducible;
 mod resume;
 mod solve;
 mod support;
+mod view;
