@@ -12,7 +12,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use twinray_scene::geom::Frame;
 use twinray_scene::sample::Stream;
-use twinray_scene::{PatchId, PatchScene, Rgb, Side};
+use twinray_scene::{PatchId, PatchScene, Rgb};
 use twinray_solve::Solution;
 
 use super::nodes::{Nodes, Place};
@@ -119,6 +119,9 @@ fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Pla
     };
     // A golden lattice, shifted for each place and round.
     let shift = [random.uniform(), random.uniform()];
+    let ray_density = f64::from(RAYS) / TAU;
+    let met = Met { scene, lights, solution, ray_density };
+    let mut emitted = Vec::new();
     let rays: Vec<(DVec3, Rgb)> = (0..RAYS)
         .map(|k| {
             let z = ((f64::from(k) + shift[0]) / f64::from(RAYS)).fract();
@@ -126,7 +129,11 @@ fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Pla
             let radius = (1.0 - z * z).max(0.0).sqrt();
             let (sin, cos) = libm::sincos(angle);
             let direction = frame.to_world(DVec3::new(radius * cos, radius * sin, z));
-            (direction, reflected_towards(scene, solution, place.patch, point, direction))
+            let [reflected, shining] = met.towards(place.patch, point, direction);
+            if !shining.is_black() {
+                emitted.push((direction, shining / ray_density));
+            }
+            (direction, reflected)
         })
         .collect();
     let mut luminances: Vec<f64> = rays.iter().map(|(_, radiance)| radiance.luminance()).collect();
@@ -142,6 +149,10 @@ fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Pla
         sum.lamps += radiance * (1.0 - kept);
         sum.towards += direction * (luminance * (1.0 - kept));
     }
+    for (direction, arriving) in emitted {
+        sum.lamps += arriving;
+        sum.towards += direction * arriving.luminance();
+    }
     for _ in 0..SHADOW_RAYS {
         let (choice, at) = (random.uniform(), [random.uniform(), random.uniform()]);
         let Some(light) = lights.sample(point, choice, at) else { continue };
@@ -152,42 +163,59 @@ fn moments(scene: &PatchScene, lights: &Lights, solution: &Solution, place: &Pla
             Some((end, normal_there)) => scene.transmittance(point, front, end, normal_there),
             None => scene.transmittance_from_sky(place.patch, point, light.towards),
         };
-        let arriving = light.radiance * seen / (light.density * f64::from(SHADOW_RAYS));
+        // The balance heuristic over rays that find what emits by themselves; they never find what has no area.
+        let others = if light.is_sharp { 0.0 } else { ray_density };
+        let arriving = light.radiance * seen / (light.density * f64::from(SHADOW_RAYS) + others);
         sum.lamps += arriving;
         sum.towards += light.towards * arriving.luminance();
     }
     sum
 }
 
-/// What surfaces reflect towards `point` from `direction`; emitted light is left to shadow rays.
-fn reflected_towards(scene: &PatchScene, solution: &Solution, patch: PatchId, point: DVec3, direction: DVec3) -> Rgb {
-    let (mut hit, mut origin, mut through) = (scene.trace_from(patch, point, direction), point, Rgb::WHITE);
-    for _ in 0..MOST_PANES {
-        let Some(met) = hit else { return Rgb::BLACK };
-        let there = scene.patch_of(&met);
-        let passing = there.and_then(|p| scene.specular(p));
-        let mut reflected = Rgb::BLACK;
-        if let Some(p) = there {
-            let scatter = scene.scatter(p);
-            let [mirrored, transmitted] = passing.map_or([Rgb::BLACK; 2], |s| s.throughput(0.5, false));
-            // Mirrors, as if they were matte: their patches know what arrives.
-            reflected =
-                through * solution.irradiance(p) * (scatter.brdf.mean_albedo() + mirrored) / std::f64::consts::PI;
-            through = through * transmitted;
+/// What rays of a place meet.
+struct Met<'a> {
+    scene: &'a PatchScene,
+    lights: &'a Lights<'a>,
+    solution: &'a Solution,
+    /// Of the place's rays, per solid angle.
+    ray_density: f64,
+}
+
+impl Met<'_> {
+    /// Radiance that arrives at `point` from `direction`: of what surfaces reflect; and of what emits, weighed by the
+    /// balance heuristic against shadow rays.
+    fn towards(&self, patch: PatchId, point: DVec3, direction: DVec3) -> [Rgb; 2] {
+        let scene = self.scene;
+        let weight = |density: f64| self.ray_density / (self.ray_density + f64::from(SHADOW_RAYS) * density);
+        let (mut hit, mut origin, mut through) = (scene.trace_from(patch, point, direction), point, Rgb::WHITE);
+        for _ in 0..MOST_PANES {
+            let Some(met) = hit else {
+                let sky = scene.environment().map_or(Rgb::BLACK, |e| e.radiance(direction));
+                return [Rgb::BLACK, through * sky * weight(self.lights.sky_density(direction))];
+            };
+            let there = scene.patch_of(&met);
+            let passing = there.and_then(|p| scene.specular(p));
+            if let Some(p) = there {
+                let emitted = scene.emission_at(met.triangle, met.side, met.u, met.v);
+                let scatter = scene.scatter(p);
+                let [mirrored, transmitted] = passing.map_or([Rgb::BLACK; 2], |s| s.throughput(0.5, false));
+                if !emitted.is_black() || transmitted.is_black() {
+                    // Mirrors, as if they were matte: their patches know what arrives.
+                    let albedo = scatter.brdf.mean_albedo() + mirrored;
+                    let reflected = through * self.solution.irradiance(p) * albedo / std::f64::consts::PI;
+                    let density = self.lights.density(point, p, scene.point_of(met.triangle, met.u, met.v));
+                    return [reflected, through * emitted * weight(density)];
+                }
+                through = through * transmitted;
+            }
+            // On through panes; and the back of a one-sided surface is not there for eyes.
+            let normal = there.map_or(-direction, |p| scene.normal(p));
+            let before = if normal.dot(direction) > 0.0 { -normal } else { normal };
+            origin += direction * met.t;
+            hit = scene.beyond(met.triangle, before, origin, direction);
         }
-        if through.is_black() || (there.is_some() && passing.is_none()) {
-            return reflected;
-        }
-        let normal = there.map_or(-direction, |p| scene.normal(p));
-        origin += direction * met.t;
-        let before = if normal.dot(direction) > 0.0 { -normal } else { normal };
-        hit = scene.beyond(met.triangle, before, origin, direction);
-        if met.side == Side::Back && there.is_none() {
-            // The back of a one-sided surface is not there for eyes.
-            continue;
-        }
+        [Rgb::BLACK; 2]
     }
-    Rgb::BLACK
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod flip;
 mod gather;
 mod reference;
 mod specular;
+mod walk;
 
 use std::f64::consts::PI;
 
