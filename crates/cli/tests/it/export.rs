@@ -78,7 +78,7 @@ fn what_cannot_be_exported_is_named() {
         (&["export", "cornell", "-o", "a.csv"][..], ["cornell", "twinray solve cornell"]),
         (&["export", "bad.twin", "-o", "a.csv"], ["bad.twin", "is no solution file"]),
         (&["export", "missing.twin", "-o", "a.csv"], ["missing.twin", "no such file"]),
-        (&["export", "bad.twin", "-o", "a.xlsx"], ["a.xlsx", ".npz, .csv, .ply or .vtu"]),
+        (&["export", "bad.twin", "-o", "a.xlsx"], ["a.xlsx", ".npz, .csv, .ply, .vtu or .html"]),
         (&["export", "bad.twin"], ["--output", "required"]),
     ] {
         let run = place.run(args);
