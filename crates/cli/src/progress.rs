@@ -29,6 +29,8 @@ pub struct Progress {
     unit: &'static str,
     /// Rays that were there before the clock started.
     before: u64,
+    /// How long the clock stood still.
+    rested: Duration,
     shown: Shown,
     last_line: f64,
 }
@@ -44,7 +46,7 @@ impl Progress {
     /// Starts the clock.
     pub fn new(goal: Goal, quiet: bool) -> Self {
         let shown = Shown::new(quiet);
-        Self { start: Instant::now(), goal, unit: "rays", before: 0, shown, last_line: 0.0 }
+        Self { start: Instant::now(), goal, unit: "rays", before: 0, rested: Duration::ZERO, shown, last_line: 0.0 }
     }
 
     /// Counts something else than rays.
@@ -57,9 +59,14 @@ impl Progress {
         Self { before, ..self }
     }
 
-    /// Seconds since the start.
+    /// Seconds since the start, rests left out.
     pub fn seconds(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+        self.start.elapsed().saturating_sub(self.rested).as_secs_f64()
+    }
+
+    /// So long nothing was done: it counts for no goal and no rate.
+    pub fn rest(&mut self, how_long: Duration) {
+        self.rested += how_long;
     }
 
     /// True once the goal is reached; the error is asked for only where it is the goal.

@@ -105,6 +105,32 @@ impl Cells {
         }
     }
 
+    /// Number of [`Cells::grid`]'s points.
+    pub fn grid_count(&self) -> u32 {
+        match *self {
+            Self::Regular { m } => (m + 1) * (m + 2) / 2,
+            Self::Strips { columns, rows, .. } => (columns + 1) * (rows + 1),
+        }
+    }
+
+    /// Points between which displays interpolate, as far apart as cells are large.
+    ///
+    /// Of regular triangles the corners of cells: (i/m, j/m), rows of j following each other with m + 1 − j points each. Of
+    /// slivers (column, row) at column/columns of the longest side and row/rows of the height there, rows of a column
+    /// following each other: even steps, unlike the cells' own columns, so that the place between them is found without a root.
+    pub fn grid(&self) -> Vec<[f64; 2]> {
+        let share = |k: u32, of: u32| f64::from(k) / f64::from(of);
+        match *self {
+            Self::Regular { m } => (0..=m).flat_map(|j| (0..=m - j).map(move |i| [share(i, m), share(j, m)])).collect(),
+            Self::Strips { columns, rows, first, foot } => (0..=columns)
+                .flat_map(|column| {
+                    let x = share(column, columns);
+                    (0..=rows).map(move |row| place_in_strip(first, foot, x, share(row, rows) * height_at(x, foot)))
+                })
+                .collect(),
+        }
+    }
+
     /// The corners of `cell`, three to six, running round as those of the triangle do.
     ///
     /// A cell under the apex of a sliver has a bend at the foot, and above the lowest row the bend makes it concave.
@@ -252,6 +278,23 @@ mod tests {
     use super::*;
     use crate::sample::Stream;
     use twinray_testkit::chi2;
+
+    #[test]
+    fn grids_have_as_many_points_as_they_say_within_their_triangle() {
+        for cells in divisions() {
+            let points = cells.grid();
+            assert_eq!(points.len() as u32, cells.grid_count(), "{cells:?}");
+            for [u, v] in &points {
+                assert!(*u > -1e-9 && *v > -1e-9 && u + v < 1.0 + 1e-9, "{cells:?}: ({u}, {v})");
+            }
+            for corner in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+                // The apex of a sliver is a point only where a column ends at its foot.
+                let is_sliver = matches!(cells, Cells::Strips { .. });
+                let there = points.iter().any(|p| (p[0] - corner[0]).abs() + (p[1] - corner[1]).abs() < 1e-9);
+                assert!(is_sliver || there, "{cells:?} lacks {corner:?}");
+            }
+        }
+    }
 
     fn divisions() -> Vec<Cells> {
         vec![

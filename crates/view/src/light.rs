@@ -9,13 +9,17 @@ use crate::container::Container;
 use crate::package::scale;
 use crate::packed::{octahedral, rgb9e5, snorm8, snorm16};
 
-/// How exact the light is.
-#[derive(Clone, Copy, Debug)]
+/// What the light is of, and how exact.
+#[derive(Clone, Debug)]
 pub struct Behind {
+    /// [`crate::package::id`].
+    pub id: String,
     /// Rays.
     pub rays: u64,
     /// Estimated relative RMS error.
     pub error: f64,
+    /// Whether nothing better will come.
+    pub is_final: bool,
 }
 
 /// Steps of the error's logarithm: 16 for a factor of two.
@@ -28,7 +32,7 @@ const LEAST_ERROR: f64 = 1.0 / 4096.0;
 /// `[glossy nodes][8][3]` (the other factors of the basis over the first, and over the largest that light from one direction
 /// gives them), `lamps` u32 `[glossy nodes][2]` (light straight from what emits, RGB9_E5 over `lampScale`; its direction,
 /// octahedral, 12 bits each, and the root of one less agreement, 8 bits), and `samples` as [`samples`] writes them.
-pub fn light(light: &NodeLight, samples: &[Sample], behind: Behind) -> Vec<u8> {
+pub fn light(light: &NodeLight, samples: &[Sample], behind: &Behind) -> Vec<u8> {
     let mut container = Container::default();
     let scale_of = scale(light.irradiance.iter().flatten().copied());
     container.add("irradiance", light.irradiance.iter().map(|e| rgb9e5(e.map(|c| c / scale_of))));
@@ -58,18 +62,18 @@ pub fn light(light: &NodeLight, samples: &[Sample], behind: Behind) -> Vec<u8> {
     container.add("lamps", lamps.collect::<Vec<u32>>());
     let sample_scale = add_samples(&mut container, samples);
     container.finish(json!({
-        "kind": "light", "lampScale": lamp_scale, "rays": behind.rays, "relativeError": finite(behind.error),
+        "kind": "light", "id": behind.id, "final": behind.is_final, "lampScale": lamp_scale, "rays": behind.rays, "relativeError": finite(behind.error),
         "scale": scale_of, "radianceScale": radiance_scale, "sampleScale": sample_scale,
     }))
 }
 
 /// Samples alone, between two lights: `samples` u32 `[glossy cells][2]`, irradiance as RGB9_E5 over `sampleScale` and the
 /// direction's octahedral numbers in sixteen bits each.
-pub fn samples(samples: &[Sample], behind: Behind) -> Vec<u8> {
+pub fn samples(samples: &[Sample], behind: &Behind) -> Vec<u8> {
     let mut container = Container::default();
     let scale = add_samples(&mut container, samples);
     container.finish(json!({
-        "kind": "samples", "rays": behind.rays, "relativeError": finite(behind.error), "sampleScale": scale,
+        "kind": "samples", "id": behind.id, "rays": behind.rays, "relativeError": finite(behind.error), "sampleScale": scale,
     }))
 }
 

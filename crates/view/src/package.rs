@@ -7,10 +7,10 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 use serde_json::{Value, json};
-use twinray::render::walk::{Lattice, NO_NODE, Nodes};
+use twinray::render::walk::Nodes;
 use twinray::scene::authored::{Material, Opacity, Surface, TextureRef, Wrap};
 use twinray::scene::brdf::{Brdf, Ggx, Phong};
-use twinray::scene::{Camera, PatchScene, Projection, Side};
+use twinray::scene::{Camera, Cells, PatchScene, Projection, Side};
 
 use crate::container::Container;
 use crate::packed::{LARGEST, octahedral, rgb9e5, snorm16};
@@ -38,7 +38,7 @@ pub struct About<'a> {
     pub texture_size: u32,
 }
 
-/// The scene's bytes, and the order of its triangles in it.
+/// The scene's bytes.
 pub fn package(scene: &PatchScene, nodes: &Nodes, about: &About) -> Vec<u8> {
     let mut container = Container::default();
     let (order, batches) = batches(scene);
@@ -71,6 +71,7 @@ pub fn package(scene: &PatchScene, nodes: &Nodes, about: &About) -> Vec<u8> {
     let cameras: Vec<Value> = about.cameras.iter().map(|c| camera(c, scene.centre())).collect();
     container.finish(json!({
         "version": 1,
+        "id": id(scene, nodes),
         "generator": concat!("twinray ", env!("CARGO_PKG_VERSION")),
         "name": about.name,
         "live": about.live,
@@ -88,6 +89,11 @@ pub fn package(scene: &PatchScene, nodes: &Nodes, about: &About) -> Vec<u8> {
         "glossy": { "slots": nodes.glossy_slots, "nodes": nodes.glossy_nodes, "cells": nodes.glossy_cells() },
         "stats": { "triangles": scene.triangle_count(), "cells": scene.len(), "nodes": nodes.len() },
     }))
+}
+
+/// What light must be of, to be that of this package: the scene as it is lit, and its nodes.
+pub fn id(scene: &PatchScene, nodes: &Nodes) -> String {
+    format!("{:016x}-{}-{}", scene.fingerprint(), nodes.len(), nodes.glossy_cells())
 }
 
 /// By which power of two numbers are divided so that they fit into [`rgb9e5`] with room.
@@ -206,18 +212,19 @@ fn camera(camera: &Camera, centre: DVec3) -> Value {
     })
 }
 
-/// Two texels of four numbers: `[m, or 2³¹ + first for strips; first slot in front; behind; material + 2¹⁶ · foot]`, where
+/// Two texels of four numbers: `[m, or for strips 2³¹ + 4 · foot + first; first slot in front; behind; material]`, where
 /// 65,535 stands for a foot at 1; `[first glossy cell in front; behind; columns; rows]`.
 fn record(scene: &PatchScene, nodes: &Nodes, t: u32) -> [u32; 8] {
     let index = t as usize;
     let [front, back] = nodes.first_slots[index];
     let [cells_front, cells_back] = nodes.first_cells[index];
     let material = scene.material_index(t) as u32;
-    match nodes.lattices[index] {
-        Lattice::Regular { m } => [m, front, back, material, cells_front, cells_back, 0, 0],
-        Lattice::Strips { columns, rows, first, foot } => {
+    match scene.cells_of(t) {
+        Cells::Regular { m } => [m, front, back, material, cells_front, cells_back, 0, 0],
+        Cells::Strips { columns, rows, first, foot } => {
             let foot = (foot * 65_535.0).round() as u32;
-            [1 << 31 | u32::from(first), front, back, material | foot << 16, cells_front, cells_back, columns, rows]
+            let kind = 1 << 31 | foot << 2 | u32::from(first);
+            [kind, front, back, material, cells_front, cells_back, columns, rows]
         }
     }
 }
@@ -304,6 +311,3 @@ impl Vertices {
         [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)]
     }
 }
-
-/// Number that stands for a side without nodes, for the page's tests.
-pub const NONE: u32 = NO_NODE;

@@ -21,6 +21,8 @@ const MOST_CONNECTIONS: usize = 256;
 /// Bytes of a request at most, and how many headers.
 const MOST_BYTES: u64 = 32_768;
 const MOST_HEADERS: usize = 64;
+/// How long the listener rests where it got no connection.
+const PAUSE: Duration = Duration::from_millis(50);
 /// How long a connection may be idle.
 const IDLE: Duration = Duration::from_secs(60);
 
@@ -46,7 +48,7 @@ pub struct Site {
     /// Name of the scene.
     pub name: String,
     /// Its bytes, [`crate::package`].
-    pub scene: Vec<u8>,
+    pub scene: Arc<Vec<u8>>,
     /// The light and the solve.
     pub feed: Arc<Feed>,
 }
@@ -128,16 +130,22 @@ fn listen(sockets: &TcpListener, server: &Arc<Inner>) {
         if server.ended.load(Ordering::SeqCst) {
             return;
         }
-        // A connection that failed before it began is the other side's matter.
-        let Ok(connection) = connection else { continue };
-        let server = server.clone();
+        let Ok(connection) = connection else {
+            // The other side's matter; or there are no more descriptors, which takes time to mend.
+            std::thread::sleep(PAUSE);
+            continue;
+        };
+        let (counted, server) = (server.clone(), server.clone());
         if server.connections.fetch_add(1, Ordering::SeqCst) < MOST_CONNECTIONS {
-            std::thread::spawn(move || {
+            let serving = std::thread::Builder::new().spawn(move || {
                 // Whoever goes away, or sends what is no request, gets no answer.
                 drop(server.serve(&connection));
                 drop(connection.shutdown(Shutdown::Both));
                 server.connections.fetch_sub(1, Ordering::SeqCst);
             });
+            if serving.is_err() {
+                counted.connections.fetch_sub(1, Ordering::SeqCst);
+            }
         } else {
             server.connections.fetch_sub(1, Ordering::SeqCst);
         }
@@ -190,7 +198,7 @@ impl Request {
 struct Answer {
     status: u16,
     headers: Vec<(&'static str, String)>,
-    body: Vec<u8>,
+    body: Arc<Vec<u8>>,
 }
 
 impl Answer {
@@ -218,7 +226,7 @@ impl Answer {
     }
 }
 
-fn with(body: Vec<u8>, kind: &str, more: &[(&'static str, &str)]) -> Answer {
+fn with(body: impl Into<Arc<Vec<u8>>>, kind: &str, more: &[(&'static str, &str)]) -> Answer {
     let common = [
         ("Content-Type", kind),
         ("Cache-Control", "no-store"),
@@ -228,7 +236,7 @@ fn with(body: Vec<u8>, kind: &str, more: &[(&'static str, &str)]) -> Answer {
         ("Cross-Origin-Opener-Policy", "same-origin"),
     ];
     let headers = common.iter().chain(more).map(|(name, value)| (*name, (*value).to_owned())).collect();
-    Answer { status: 200, headers, body }
+    Answer { status: 200, headers, body: body.into() }
 }
 
 fn plain(status: u16, text: &str) -> Answer {
@@ -259,7 +267,11 @@ impl Inner {
         let ours = |origin: &str| self.hosts.iter().any(|h| origin == format!("http://{h}"));
         let foreign_origin = request.header("Origin").is_some_and(|o| !ours(o));
         let foreign_site = request.header("Sec-Fetch-Site").is_some_and(|s| !matches!(s, "same-origin" | "none"));
-        if foreign_origin || foreign_site {
+        // A link to the page may stand anywhere: whoever follows it knows the token, and nobody else sees what comes.
+        let is_link = request.method == "GET"
+            && request.header("Sec-Fetch-Mode") == Some("navigate")
+            && request.header("Sec-Fetch-Dest") == Some("document");
+        if foreign_origin || foreign_site && !is_link {
             return plain(403, "this server is for its own page alone");
         }
         let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
@@ -275,7 +287,7 @@ impl Inner {
                 Answer { status: 308, ..with(Vec::new(), "text/plain", &[("Location", &place)]) }
             }
             ("GET", Some("")) => self.page(),
-            ("GET", Some("style.css")) => with(page::STYLE.into(), "text/css; charset=utf-8", &[]),
+            ("GET", Some("style.css")) => with(page::STYLE.as_bytes().to_vec(), "text/css; charset=utf-8", &[]),
             ("GET", Some("scene")) => with(self.site.scene.clone(), "application/octet-stream", &[]),
             ("GET", Some("status")) => with(feed.status().to_string().into_bytes(), "application/json", &[]),
             ("GET", Some("light")) => {
@@ -283,8 +295,7 @@ impl Inner {
                 match feed.next(after, PATIENCE) {
                     Some(message) => {
                         let number = message.number.to_string();
-                        let bytes = message.bytes.as_ref().clone();
-                        with(bytes, "application/octet-stream", &[("X-Number", &number)])
+                        with(message.bytes, "application/octet-stream", &[("X-Number", &number)])
                     }
                     None => plain(204, ""),
                 }
@@ -294,7 +305,7 @@ impl Inner {
                 with(b"{}".to_vec(), "application/json", &[])
             }
             ("GET", Some(name)) => match page::MODULES.iter().find(|(n, _)| *n == name) {
-                Some((_, text)) => with((*text).into(), "text/javascript; charset=utf-8", &[]),
+                Some((_, text)) => with(text.as_bytes().to_vec(), "text/javascript; charset=utf-8", &[]),
                 None => plain(404, "no such file"),
             },
             _ => plain(405, "only what the page asks for"),
@@ -325,7 +336,7 @@ mod tests {
     const TOKEN: &str = "0123456789abcdef";
 
     fn server() -> Running {
-        let site = Site { name: "test".to_owned(), scene: vec![7; 9], feed: Arc::new(Feed::default()) };
+        let site = Site { name: "test".to_owned(), scene: Arc::new(vec![7; 9]), feed: Arc::default() };
         Running::start(site, 0, TOKEN.to_owned()).unwrap()
     }
 
@@ -359,6 +370,17 @@ mod tests {
             (get("/0123456789abcdeX/", ""), 403),
             (get(&ours(""), "Origin: http://elsewhere.example\r\n"), 403),
             (get(&ours("scene"), "Sec-Fetch-Site: cross-site\r\n"), 403),
+            (
+                get(
+                    &ours(""),
+                    "Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: document\r\n",
+                ),
+                200,
+            ),
+            (
+                get(&ours(""), "Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: iframe\r\n"),
+                403,
+            ),
             (get(&ours(""), "").replace("HOST", "elsewhere.example"), 403),
             (get(&ours(""), "").replace("Host: HOST\r\n", ""), 403),
             (get(&ours("pause"), "").replace("GET", "PUT"), 405),
@@ -414,7 +436,7 @@ mod tests {
     #[test]
     fn a_taken_port_is_told() {
         let first = server();
-        let site = Site { name: String::new(), scene: Vec::new(), feed: Arc::default() };
+        let site = Site { name: String::new(), scene: Arc::default(), feed: Arc::default() };
         let error = Running::start(site, first.address.port(), TOKEN.to_owned()).unwrap_err().to_string();
         assert!(error.contains("leave --port out"), "{error}");
     }

@@ -22,7 +22,7 @@ export class Live {
      */
     constructor(walk, listener) {
         this.base = walk.base;
-        this.name = walk.name;
+        this.id = walk.scene.header.id;
         this.listener = listener;
         this.#follow();
         this.#watch();
@@ -56,11 +56,14 @@ export class Live {
     /** Light, message by message; each request waits at the server until there is one. */
     async #follow() {
         while (!this.#closed) {
+            await shown();
             try {
                 const answer = await fetch(`${this.base}light?after=${this.#number}`, { signal: this.#stop.signal });
                 if (answer.status === 403) return this.#lose("the server was started anew with another address");
                 if (answer.status === 200) {
                     const container = readContainer(await answer.arrayBuffer());
+                    // A restarted server may have another scene, or the same with other cells.
+                    if (container.header.id !== this.id) return location.reload();
                     this.#number = Number(answer.headers.get("X-Number"));
                     this.listener.onLight(container);
                 }
@@ -103,6 +106,12 @@ export class Live {
         this.#last = { ...last, state: "lost", message };
         this.listener.onStatus(this.#last);
     }
+}
+
+/** Until somebody looks: the server keeps what is newest. */
+function shown() {
+    if (!document.hidden) return Promise.resolve();
+    return new Promise((done) => document.addEventListener("visibilitychange", done, { once: true }));
 }
 
 /** @param {number} milliseconds */

@@ -40,7 +40,7 @@ export function find(walk, resources, triangle, u, v, front) {
     return {
         point,
         normal: /** @type {Vec3} */ (across.map((x) => x / size)),
-        material: record[3] & 0xffff,
+        material: record[3],
         cell,
         around: around.map(([slot, weight]) => ({ slot: first + slot, weight })),
     };
@@ -55,7 +55,7 @@ export function find(walk, resources, triangle, u, v, front) {
  */
 function locate(record, u, v) {
     if (record[0] >>> 31) {
-        const foot = (record[3] >>> 16) / 65535;
+        const foot = ((record[0] >>> 2) & 0xffff) / 65535;
         const [columns, rows] = [record[6], record[7]];
         const w = [1 - u - v, u, v];
         const first = record[0] & 3;

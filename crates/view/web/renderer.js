@@ -124,9 +124,14 @@ export class Renderer {
         return this.options.exposure ?? this.#exposure;
     }
 
-    /** Frames in the picture that is shown, and whether more will come. */
+    /** Frames in the picture that is shown, whether more will come, updates of samples in it, and whether better light will. */
     get state() {
-        return { frames: this.#frames, resting: this.#requested === 0, updates: this.#updates };
+        return {
+            frames: this.#frames,
+            resting: this.#requested === 0,
+            updates: this.#updates,
+            isFinal: this.resources.light.isFinal,
+        };
     }
 
     /** @param {Pose} view */
@@ -449,7 +454,7 @@ export class Renderer {
                 sum += numbers[i];
                 weight += numbers[i + 1];
             }
-            if (weight > 0) this.#target = Math.log2(MIDDLE_GREY * this.#baked) - sum / weight;
+            if (weight > 0 && Number.isFinite(sum)) this.#target = Math.log2(MIDDLE_GREY * this.#baked) - sum / weight;
         }
         if (Number.isNaN(this.#target)) return true;
         const off = this.#target - this.#exposure;

@@ -67,6 +67,7 @@ export class Resources {
             lampScale: 1,
             sampleScale: 1,
             hasSamples: false,
+            isFinal: false,
         };
         const slots = this.nodes.length;
         const glossy = Math.max(1, this.glossySlots);
@@ -88,6 +89,7 @@ export class Resources {
             light.irradiance = /** @type {Uint32Array} */ (arrays.irradiance);
             light.error = /** @type {Uint8Array} */ (arrays.error);
             light.scale = header.scale;
+            light.isFinal = header.final;
             light.radianceScale = header.radianceScale;
             light.lampScale = header.lampScale;
             const irradiance = new Uint32Array(nodes.length);

@@ -9,6 +9,16 @@ precision highp sampler2D;
 precision highp usampler2D;
 `;
 
+/** Unit vectors from two numbers: octahedral of crates/view/src/packed.rs. */
+const OCTAHEDRON = `vec3 fromOctahedron(vec2 p) {
+    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    float t = max(-n.z, 0.0);
+    n.x += n.x >= 0.0 ? -t : t;
+    n.y += n.y >= 0.0 ? -t : t;
+    return normalize(n);
+}
+`;
+
 /** Vertices come one a corner, so that three in a row are a triangle and their numbers its number. */
 export const SURFACE_VERTEX = `${HEAD}
 layout(location = 0) in vec3 position;
@@ -20,14 +30,7 @@ out vec2 vPlace;
 out vec3 vPoint;
 out vec3 vNormal;
 out vec4 vTexcoords;
-vec3 fromOctahedron(vec2 p) {
-    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    float t = max(-n.z, 0.0);
-    n.x += n.x >= 0.0 ? -t : t;
-    n.y += n.y >= 0.0 ? -t : t;
-    return normalize(n);
-}
-void main() {
+${OCTAHEDRON}void main() {
     vTriangle = uint(gl_VertexID / 3);
     int corner = gl_VertexID % 3;
     vPlace = vec2(corner == 1 ? 1.0 : 0.0, corner == 2 ? 1.0 : 0.0);
@@ -69,7 +72,7 @@ vec2 inStrips(uvec4 record, vec2 place, float foot) {
 }
 Around slotsAround(uvec4 record, uvec4 more, vec2 place) {
     if ((record.x & 0x80000000u) != 0u) {
-        float foot = float(record.w >> 16) / 65535.0;
+        float foot = float((record.x >> 2) & 0xffffu) / 65535.0;
         int columns = int(more.z), rows = int(more.w);
         vec2 p = inStrips(record, place, foot) * vec2(columns, rows);
         ivec2 k = clamp(ivec2(p), ivec2(0), ivec2(columns - 1, rows - 1));
@@ -92,7 +95,7 @@ Around slotsAround(uvec4 record, uvec4 more, vec2 place) {
 /* The cell at a place: Cells::locate of crates/scene/src/cells.rs. */
 int cellAt(uvec4 record, uvec4 more, vec2 place) {
     if ((record.x & 0x80000000u) != 0u) {
-        float foot = float(record.w >> 16) / 65535.0;
+        float foot = float((record.x >> 2) & 0xffffu) / 65535.0;
         int columns = int(more.z), rows = int(more.w);
         vec2 p = inStrips(record, place, foot);
         int column = min(int(areaLeftOf(p.x, foot) * float(columns)), columns - 1);
@@ -135,6 +138,8 @@ const float PI = 3.141592653589793;
 const float BRIGHTEST = 12.0;
 const float FIREFLY = 8.0;
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+/* What half floats hold: one infinite or undefined fragment would stay in a mean for good. */
+vec3 finite(vec3 c) { return any(isnan(c)) ? vec3(0.0) : clamp(c, -60000.0, 60000.0); }
 float random(vec3 p) {
     uvec3 q = uvec3(floatBitsToUint(p.x), floatBitsToUint(p.y), floatBitsToUint(p.z)) * uvec3(1664525u, 22695477u, 1103515245u);
     uint h = q.x ^ q.y ^ q.z;
@@ -148,14 +153,7 @@ vec2 transformed(int k) {
     vec2 uv = offset.z > 0.5 ? vTexcoords.zw : vTexcoords.xy;
     return mat2(matrix.xy, matrix.zw) * uv + offset.xy;
 }
-vec3 fromOctahedron(vec2 p) {
-    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    float t = max(-n.z, 0.0);
-    n.x += n.x >= 0.0 ? -t : t;
-    n.y += n.y >= 0.0 ? -t : t;
-    return normalize(n);
-}
-/* Normals of the map, by the derivatives of place and texture coordinates (Schüler, "Normal mapping without precomputed
+${OCTAHEDRON}/* Normals of the map, by the derivatives of place and texture coordinates (Schüler, "Normal mapping without precomputed
    tangents", ShaderX 5, 2006). */
 vec3 bumped(vec3 n, vec2 uv, float scale) {
     vec3 p1 = dFdx(vPoint), p2 = dFdy(vPoint);
@@ -205,21 +203,21 @@ vec2 shrink(Look l, float co) {
 void main() {
     int triangle = int(vTriangle);
     uvec4 record = texelFetch(uTriangles, at(2 * triangle), 0), more = texelFetch(uTriangles, at(2 * triangle + 1), 0);
-    materialStart = int(record.w & 0xffffu) * ${MATERIAL_TEXELS};
+    materialStart = int(record.w) * ${MATERIAL_TEXELS};
     bool front = gl_FrontFacing;
     uint first = front ? record.y : record.z;
     vec4 base = material(0), glow = material(1), m2 = material(2), m3 = material(3), m4 = material(4);
     vec4 texel = uHas.x ? texture(uBase, transformed(6)) : vec4(1.0);
     vec3 color = base.rgb * texel.rgb;
     float alpha = base.a * texel.a;
-    if (m4.x >= 0.0 && alpha < m4.x) discard;
-    if (first == NONE) discard;
 
     vec3 wo = normalize(uEye - vPoint);
     vec3 facet = normalize(cross(dFdx(vPoint), dFdy(vPoint)));
     facet = dot(facet, wo) < 0.0 ? -facet : facet;
     vec3 n = normalize(vNormal);
     n = dot(n, facet) < 0.0 ? -n : n;
+    /* Holes, after what neighbouring fragments have to take part in. */
+    if ((m4.x >= 0.0 && alpha < m4.x) || first == NONE) discard;
 
     /* Irradiance, smooth between the corners of cells. */
     Around around = slotsAround(record, more, vPlace);
@@ -349,8 +347,8 @@ void main() {
         known *= mix(1.0, 0.55, clamp(1.0 + line, 0.0, 1.0) * (1.0 - smoothstep(0.3, 0.8, far)));
     }
     /* The second alpha says what automatic exposure looks at. */
-    oKnown = vec4(known * uScales.w + emitted, cover);
-    oSampled = vec4(sampled * uScales.w, lit && !emits ? cover : 0.0);
+    oKnown = vec4(finite(known * uScales.w + emitted), cover);
+    oSampled = vec4(finite(sampled * uScales.w), lit && !emits ? cover : 0.0);
 }`;
 
 /** What lies behind everything. */
@@ -379,11 +377,13 @@ in vec2 vPlace;
 in vec4 vTexcoords;
 uniform sampler2D uMaterials, uBase;
 layout(location = 0) out uvec4 oPicked;
-vec4 material(int k) { return texelFetch(uMaterials, at(int(texelFetch(uTriangles, at(2 * int(vTriangle)), 0).w & 0xffffu) * ${MATERIAL_TEXELS} + k), 0); }
+vec4 material(int k) { return texelFetch(uMaterials, at(int(texelFetch(uTriangles, at(2 * int(vTriangle)), 0).w) * ${MATERIAL_TEXELS} + k), 0); }
 void main() {
     vec4 matrix = material(6), offset = material(7);
     vec2 uv = mat2(matrix.xy, matrix.zw) * (offset.z > 0.5 ? vTexcoords.zw : vTexcoords.xy) + offset.xy;
-    if (material(4).x >= 0.0 && material(0).a * texture(uBase, uv).a < material(4).x) discard;
+    float alpha = material(0).a * texture(uBase, uv).a;
+    uvec4 record = texelFetch(uTriangles, at(2 * int(vTriangle)), 0);
+    if ((material(4).x >= 0.0 && alpha < material(4).x) || (gl_FrontFacing ? record.y : record.z) == NONE) discard;
     oPicked = uvec4(vTriangle + 1u, floatBitsToUint(vPlace.x), floatBitsToUint(vPlace.y), gl_FrontFacing ? 1u : 0u);
 }`;
 

@@ -36,7 +36,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Ending> {
             output.put(|out| write(&table, out))?;
         }
         None => {
-            let page = view::export(name, &args.output, &loaded, args.texture_size, args.unit_name.as_str())?;
+            let page = view::export(args, &loaded)?;
             output.put(|out| out.write_all(&page))?;
         }
     }

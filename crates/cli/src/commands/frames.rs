@@ -250,28 +250,8 @@ fn lit(args: &RenderArgs, loaded: &Loaded) -> anyhow::Result<Lit> {
         MethodArg::Patches => solving::goal(&args.solve, patches, None),
     };
     let light = light(args, loaded, None, goal)?;
-    let Light { solution, settings, seconds, rate, interrupted } = &light;
-    let balance = solution.balance();
-    let remarks = [
-        commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene)),
-        commands::invalid_warning(solution.invalid_deposits(), "deposits").map(|w| format!("{}: {w}", args.load.scene)),
-        matte_warning(args, solution),
-    ];
-    let remarks: Vec<String> = remarks.into_iter().flatten().collect();
-    commands::print_warnings(&remarks, args.load.quiet);
-    warnings.extend(remarks);
-    if !args.load.quiet {
-        crate::say!("{}", commands::balance_line(&balance));
-        crate::say!(
-            "{}: {} rays {} in {seconds:.1} s{}, estimated error {:.2} %, seed {}",
-            loaded.name,
-            solution.rays(),
-            if loaded.stored.is_some() { "read" } else { "shot" },
-            if *rate > 0.0 { format!(" ({:.2} M/s)", rate * 1e-6) } else { String::new() },
-            100.0 * solution.relative_error(),
-            settings.seed,
-        );
-    }
+    let Light { solution, settings, interrupted, .. } = &light;
+    warnings.extend(light.tell(args, loaded, matte_warning(args, solution)));
     let Settings { seed, preset, .. } = *settings;
     let how = format!("{} rays, ", solution.rays());
     let stopped = *interrupted;

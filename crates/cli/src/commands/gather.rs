@@ -55,26 +55,11 @@ pub(super) fn run(
         (Some(rays), _) => Goal::Rays(rays),
         (None, None) => Goal::Rays(solving::rays_for_gather(patches)),
     };
-    let Light { solution, settings, seconds, rate, interrupted } = light(args, loaded, None, goal)?;
-    let balance = solution.balance();
+    let light = light(args, loaded, None, goal)?;
     let mut warnings = loaded.warnings.clone();
-    let loss = commands::loss_warning(&balance).map(|w| format!("{}: {w}", args.load.scene));
-    let dropped = commands::invalid_warning(solution.invalid_deposits(), "deposits");
-    let remarks: Vec<String> = loss.into_iter().chain(dropped.map(|w| format!("{}: {w}", args.load.scene))).collect();
-    commands::print_warnings(&remarks, args.load.quiet);
-    warnings.extend(remarks);
-    if !args.load.quiet {
-        crate::say!("{}", commands::balance_line(&balance));
-        crate::say!(
-            "{}: {} rays {} in {seconds:.1} s{}, estimated error {:.2} %, seed {}",
-            loaded.name,
-            solution.rays(),
-            if loaded.stored.is_some() { "read" } else { "shot" },
-            if rate > 0.0 { format!(" ({:.2} M/s)", rate * 1e-6) } else { String::new() },
-            100.0 * solution.relative_error(),
-            settings.seed,
-        );
-    }
+    warnings.extend(light.tell(args, loaded, None));
+    let Light { solution, settings, seconds, rate, interrupted } = light;
+    let balance = solution.balance();
 
     let Film { width, height, crop } = film;
     let pixels = u64::from(film.size().0) * u64::from(film.size().1);

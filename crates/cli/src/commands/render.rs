@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 use glam::DMat3;
 use serde_json::json;
 use twinray::format;
@@ -166,18 +166,43 @@ pub(super) struct Light {
     pub interrupted: bool,
 }
 
+impl Light {
+    /// Says how the light is, and what is to be warned of: that, and `more`.
+    pub(super) fn tell(&self, args: &RenderArgs, loaded: &Loaded, more: Option<String>) -> Vec<String> {
+        let Self { solution, settings, seconds, rate, .. } = self;
+        let (name, balance) = (&args.load.scene, solution.balance());
+        let of_scene =
+            [commands::loss_warning(&balance), commands::invalid_warning(solution.invalid_deposits(), "deposits")];
+        let remarks: Vec<String> = of_scene.into_iter().flatten().map(|w| format!("{name}: {w}")).chain(more).collect();
+        commands::print_warnings(&remarks, args.load.quiet);
+        if !args.load.quiet {
+            crate::say!("{}", commands::balance_line(&balance));
+            crate::say!(
+                "{}: {} rays {} in {seconds:.1} s{}, estimated error {:.2} %, seed {}",
+                loaded.name,
+                solution.rays(),
+                if loaded.stored.is_some() { "read" } else { "shot" },
+                if *rate > 0.0 { format!(" ({:.2} M/s)", rate * 1e-6) } else { String::new() },
+                100.0 * solution.relative_error(),
+                settings.seed,
+            );
+        }
+        remarks
+    }
+}
+
 /// Solves the scene, or takes the light of the solution file that stands for it. A camera is told to the solver where its
 /// picture is to be of what patches remember.
 pub(super) fn light(args: &RenderArgs, loaded: &Loaded, camera: Option<&Camera>, goal: Goal) -> anyhow::Result<Light> {
     let name = &args.load.scene;
-    let Some(stored) = &loaded.stored else {
+    if loaded.stored.is_none() {
         let settings = Settings::new(&args.solve, None);
         let observer = camera.map(|camera| Observer::new(&loaded.patches, camera));
         let start = solving::Start { settings: &settings, stored: None, observer, peers: None };
         let solved = solving::solve(start, goal, name, loaded, args.load.quiet, |_, _| ())?;
         let (seconds, rate, interrupted) = (solved.seconds, solved.rate(), solved.interrupted);
         return Ok(Light { solution: solved.solver.solution(), settings, seconds, rate, interrupted });
-    };
+    }
     let is_gather = args.method() == MethodArg::Gather;
     if args.solve.rays.is_some() || (!is_gather && (args.solve.time.is_some() || args.solve.error.is_some())) {
         let those = if is_gather { "--rays is" } else { "--rays, --time and --error are" };
@@ -186,13 +211,7 @@ pub(super) fn light(args: &RenderArgs, loaded: &Loaded, camera: Option<&Camera>,
         );
     }
     let start = Instant::now();
-    let file = stored.read()?;
-    let record = file.record().map_err(|e| anyhow!("{e}"))?;
-    let record = record.ok_or_else(|| {
-        anyhow!("{name}: is a reference, which knows no reflections; expected a solve, as `twinray solve` writes it")
-    })?;
-    let settings = Settings::stored(name, file.provenance(), &args.solve)?;
-    let solution = record.solution(&loaded.patches, &settings.params()).map_err(|e| anyhow!("{name}: {e}"))?;
+    let (solution, settings) = solving::stored(name, loaded, &args.solve)?;
     Ok(Light { solution, settings, seconds: start.elapsed().as_secs_f64(), rate: 0.0, interrupted: false })
 }
 

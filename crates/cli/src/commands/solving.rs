@@ -2,7 +2,7 @@
 //! that keep what there is.
 
 use anyhow::anyhow;
-use twinray::solve::{Observer, Peers, Solver};
+use twinray::solve::{Observer, Peers, Solution, Solver};
 
 use crate::args::SolveArgs;
 use crate::estimate::{Rays, Work};
@@ -56,7 +56,7 @@ pub fn solve<'a>(
     name: &str,
     loaded: &'a Loaded,
     quiet: bool,
-    mut look: impl FnMut(&Solver, &Progress),
+    mut look: impl FnMut(&Solver, &mut Progress),
 ) -> anyhow::Result<Solved<'a>> {
     let Start { settings, stored, observer, peers } = start;
     let mut progress = Progress::new(goal, quiet);
@@ -87,12 +87,26 @@ pub fn solve<'a>(
         if progress.wants_update() {
             progress.update(solver.rays(), solver.relative_error());
         }
-        look(&solver, &progress);
+        look(&solver, &mut progress);
     }
     let interrupted = any(interrupt::requested());
     progress.finish();
     let seconds = progress.seconds();
     Ok(Solved { solver, before, seconds, interrupted })
+}
+
+/// The solution of the .twin file that stands for the scene, with the settings that it was made with. `args` may only repeat
+/// them.
+pub fn stored(name: &str, loaded: &Loaded, args: &SolveArgs) -> anyhow::Result<(Solution, Settings)> {
+    let stored = loaded.stored.as_ref().ok_or_else(|| anyhow!("{name}: is no solution; expected a .twin file"))?;
+    let file = stored.read()?;
+    let record = file.record().map_err(|e| anyhow!("{e}"))?;
+    let record = record.ok_or_else(|| {
+        anyhow!("{name}: is a reference, which knows no reflections; expected a solve, as `twinray solve` writes it")
+    })?;
+    let settings = Settings::stored(name, file.provenance(), args)?;
+    let solution = record.solution(&loaded.patches, &settings.params()).map_err(|e| anyhow!("{name}: {e}"))?;
+    Ok((solution, settings))
 }
 
 /// What is to be done, for the estimate.

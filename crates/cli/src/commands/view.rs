@@ -1,20 +1,20 @@
 //! `twinray view`: a walk through a scene in a browser while it is solved, or through the light of a .twin file.
 
-use std::path::Path;
+use std::io::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use anyhow::{anyhow, bail};
+use anyhow::{Context, bail};
 use serde_json::{Value, json};
 use twinray::render::walk::{Nodes, WalkLight};
 use twinray::scene::PatchScene;
 use twinray::solve::{Solution, Solver};
 use twinray_view::feed::Feed;
 use twinray_view::light::{self, Behind};
-use twinray_view::package::{About, package};
+use twinray_view::package::{About, id, package};
 use twinray_view::server::{self, Running, Site};
 
-use crate::args::{SolveArgs, ViewerArgs};
+use crate::args::{ExportArgs, SolveArgs, ViewerArgs};
 use crate::commands::solve::Keeper;
 use crate::commands::{self, solving};
 use crate::failure::Ending;
@@ -33,7 +33,7 @@ const SAMPLES_INTERVAL: f64 = 0.25;
 /// Seconds between two messages of how far the solve is.
 const STATUS_INTERVAL: f64 = 0.25;
 /// Gathers for the directions of light at glossy places where the light is finished.
-pub(super) const FINISHED_ROUNDS: u32 = 8;
+const FINISHED_ROUNDS: u32 = 8;
 /// How long the solver rests before it looks for signals, and the end of all work too.
 const REST: Duration = Duration::from_millis(200);
 
@@ -81,9 +81,9 @@ pub fn run(args: &ViewerArgs) -> anyhow::Result<Ending> {
         texture_size: args.texture_size,
     };
     let scene = package(&loaded.patches, &nodes, &about);
-    let site = Site { name: loaded.name.clone(), scene, feed: feed.clone() };
+    let site = Site { name: loaded.name.clone(), scene: Arc::new(scene), feed: feed.clone() };
     let running = Running::start(site, args.port.unwrap_or(0), token)?;
-    announce(args, &loaded, &running.url());
+    announce(args, &loaded, &running.url())?;
     let mut sender = Sender::new(&loaded.patches, &nodes, &feed);
     match is_stored {
         true => show(args, &loaded, &mut sender)?,
@@ -96,16 +96,18 @@ pub fn run(args: &ViewerArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-fn announce(args: &ViewerArgs, loaded: &Loaded, url: &str) {
-    if args.load.json {
-        // One line, at once: whoever reads it waits for it.
-        println!(
-            "{}",
-            json!({ "url": url, "scene": loaded.name, "patches": loaded.patches.len(), "warnings": loaded.warnings })
-        );
-    } else {
-        println!("{url}");
-    }
+/// Says where the page is: one line, at once, since whoever reads it waits for it.
+fn announce(args: &ViewerArgs, loaded: &Loaded, url: &str) -> anyhow::Result<()> {
+    let line = match args.load.json {
+        true => {
+            let (patches, warnings) = (loaded.patches.len(), &loaded.warnings);
+            json!({ "url": url, "scene": loaded.name, "patches": patches, "warnings": warnings }).to_string()
+        }
+        false => url.to_owned(),
+    };
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{line}").and_then(|()| out.flush()).context("standard output, which is told the address")?;
+    drop(out);
     if !args.load.quiet {
         crate::say!("{}: open this address in a browser on this machine; Ctrl-C ends", loaded.name);
     }
@@ -114,27 +116,15 @@ fn announce(args: &ViewerArgs, loaded: &Loaded, url: &str) {
     {
         crate::say!("warning: no browser was opened ({error}); open the address yourself");
     }
+    Ok(())
 }
 
 /// The light of a file.
 fn show(args: &ViewerArgs, loaded: &Loaded, sender: &mut Sender) -> anyhow::Result<()> {
-    let solution = stored_solution(&args.load.scene, loaded)?;
+    let (solution, _) = solving::stored(&args.load.scene, loaded, &args.solve)?;
     sender.light(&solution, 1);
-    sender.status("finished", solution.rays(), solution.relative_error(), Value::Null);
-    sender.finished(&solution);
+    sender.finished(&solution, Value::Null);
     Ok(())
-}
-
-/// The solution of a .twin file that was loaded.
-pub(super) fn stored_solution(name: &str, loaded: &Loaded) -> anyhow::Result<Solution> {
-    let stored = loaded.stored.as_ref().ok_or_else(|| anyhow!("{name}: is no solution"))?;
-    let file = stored.read()?;
-    let record = file.record().map_err(|e| anyhow!("{e}"))?;
-    let record = record.ok_or_else(|| {
-        anyhow!("{name}: is a reference, which knows no reflections; expected a solve, as `twinray solve` writes it")
-    })?;
-    let settings = Settings::stored(name, file.provenance(), &SolveArgs::default())?;
-    record.solution(&loaded.patches, &settings.params()).map_err(|e| anyhow!("{name}: {e}"))
 }
 
 /// Solves, with light on the way.
@@ -148,24 +138,28 @@ fn solve(args: &ViewerArgs, loaded: &Loaded, sender: &mut Sender, output: Option
         Goal::First(n, _) => json!({ "rays": n }),
     };
     let start = solving::Start { settings: &settings, stored: None, observer: None, peers: None };
-    let solved = solving::solve(start, goal, &args.load.scene, loaded, args.load.quiet, |solver, _| {
-        sender.follow(solver, &told);
+    let solved = solving::solve(start, goal, &args.load.scene, loaded, args.load.quiet, |solver, progress| {
+        sender.follow(solver, progress.seconds(), &told);
         while sender.feed.is_paused() && !interrupt::requested() {
-            sender.rest(solver, &told);
+            let start = Instant::now();
+            sender.status("paused", solver.rays(), solver.relative_error(), progress.seconds(), told.clone());
+            sender.feed.rest(REST);
+            progress.rest(start.elapsed());
         }
     })?;
     let solver = &solved.solver;
     if let (Some(path), Some(output)) = (&args.output, output) {
         let mut keeper = Keeper::new(loaded, settings, path, Some(output));
         let error = keeper.keep(solver).map_err(|error| keeper.rescue(solver, error))?;
-        crate::say!("{}: {} rays, estimated error {:.2} %", path.display(), solver.rays(), 100.0 * error);
+        if !args.load.quiet {
+            crate::say!("{}: {} rays, estimated error {:.2} %", path.display(), solver.rays(), 100.0 * error);
+        }
     } else if solved.interrupted && !args.load.quiet {
         crate::say!("{}: the light of {} rays was not kept: -o FILE.twin would keep it", loaded.name, solver.rays());
     }
     if !solved.interrupted {
-        let solution = solver.solution();
-        sender.finished(&solution);
-        sender.status("finished", solver.rays(), solution.relative_error(), told);
+        sender.seconds = solved.seconds;
+        sender.finished(&solver.solution(), told);
     }
     Ok(())
 }
@@ -173,27 +167,31 @@ fn solve(args: &ViewerArgs, loaded: &Loaded, sender: &mut Sender, output: Option
 /// Makes messages of solutions.
 struct Sender<'a> {
     light: WalkLight<'a>,
+    /// What it is of.
+    id: String,
     feed: &'a Feed,
-    start: Instant,
+    /// Seconds of the solve, rests left out.
+    seconds: f64,
     /// When, after how many rays, and at what cost in seconds, the last one went out.
     last_light: Option<(Instant, u64, f64)>,
-    last_samples: Instant,
+    /// When, and at what cost in seconds.
+    last_samples: (Instant, f64),
     last_status: Instant,
     glossy: bool,
-    /// Seconds in which the solver rested.
-    rested: f64,
 }
 
 impl<'a> Sender<'a> {
     fn new(scene: &'a PatchScene, nodes: &'a Nodes, feed: &'a Feed) -> Self {
         let now = Instant::now();
-        let light = WalkLight::new(scene, nodes);
+        let (light, id) = (WalkLight::new(scene, nodes), id(scene, nodes));
         let glossy = nodes.glossy_cells() > 0;
-        Self { light, feed, start: now, last_light: None, last_samples: now, last_status: now, glossy, rested: 0.0 }
+        Self { light, id, feed, seconds: 0.0, last_light: None, last_samples: (now, 0.0), last_status: now, glossy }
     }
 
     /// After a wave: whatever is due.
-    fn follow(&mut self, solver: &Solver, goal: &Value) {
+    fn follow(&mut self, solver: &Solver, seconds: f64, goal: &Value) {
+        let (last_samples, cost_of_samples) = self.last_samples;
+        let samples_due = last_samples.elapsed().as_secs_f64() >= SAMPLES_INTERVAL.max(cost_of_samples / SHARE);
         let rays = solver.rays();
         let due = match self.last_light {
             None => true,
@@ -204,30 +202,24 @@ impl<'a> Sender<'a> {
         };
         if due {
             self.light(&solver.solution(), 1);
-        } else if self.glossy && self.last_samples.elapsed().as_secs_f64() >= SAMPLES_INTERVAL {
+        } else if self.glossy && samples_due {
+            let start = Instant::now();
             let solution = solver.solution();
-            let behind = Behind { rays, error: solution.relative_error() };
-            self.feed.send_samples(light::samples(&self.light.samples(&solution), behind));
-            self.last_samples = Instant::now();
+            let samples = light::samples(&self.light.samples(&solution), &self.behind(&solution));
+            self.feed.send_samples(samples);
+            self.last_samples = (Instant::now(), start.elapsed().as_secs_f64());
         }
         if due || self.last_status.elapsed().as_secs_f64() >= STATUS_INTERVAL {
-            self.status("solving", rays, solver.relative_error(), goal.clone());
+            self.status("solving", rays, solver.relative_error(), seconds, goal.clone());
         }
-    }
-
-    /// While a page wants the solver to rest.
-    fn rest(&mut self, solver: &Solver, goal: &Value) {
-        self.status("paused", solver.rays(), solver.relative_error(), goal.clone());
-        let start = Instant::now();
-        self.feed.rest(REST);
-        self.rested += start.elapsed().as_secs_f64();
     }
 
     /// The light of a solution that is final. It has no samples: one of each cell is noise, which only many average.
-    fn finished(&mut self, solution: &Solution) {
+    fn finished(&mut self, solution: &Solution, goal: Value) {
+        // There is nothing to pause any more, though the last gather takes its time.
+        self.status("finished", solution.rays(), solution.relative_error(), self.seconds, goal);
         let light = self.light.of(solution, FINISHED_ROUNDS);
-        let behind = Behind { rays: solution.rays(), error: solution.relative_error() };
-        self.feed.send_light(light::light(&light, &[], behind));
+        self.feed.send_light(light::light(&light, &[], &Behind { is_final: true, ..self.behind(solution) }));
     }
 
     /// The light of a solution.
@@ -235,14 +227,17 @@ impl<'a> Sender<'a> {
         let start = Instant::now();
         let first = self.last_light.is_none();
         let light = if first { self.light.rough(solution) } else { self.light.of(solution, rounds) };
-        let behind = Behind { rays: solution.rays(), error: solution.relative_error() };
-        self.feed.send_light(light::light(&light, &self.light.samples(solution), behind));
+        let bytes = light::light(&light, &self.light.samples(solution), &self.behind(solution));
+        self.feed.send_light(bytes);
         self.last_light = Some((Instant::now(), solution.rays(), start.elapsed().as_secs_f64()));
-        self.last_samples = Instant::now();
+        self.last_samples.0 = Instant::now();
     }
 
-    fn status(&mut self, state: &str, rays: u64, error: f64, goal: Value) {
-        let seconds = self.start.elapsed().as_secs_f64() - self.rested;
+    fn behind(&self, solution: &Solution) -> Behind {
+        Behind { id: self.id.clone(), rays: solution.rays(), error: solution.relative_error(), is_final: false }
+    }
+
+    fn status(&mut self, state: &str, rays: u64, error: f64, seconds: f64, goal: Value) {
         self.feed.send_status(json!({
             "state": state, "rays": rays, "rate": rays as f64 / seconds.max(1e-9),
             "error": Some(error).filter(|e| e.is_finite()), "seconds": seconds, "goal": goal,
@@ -251,22 +246,22 @@ impl<'a> Sender<'a> {
     }
 }
 
-/// Writes a finished walk-through.
-pub(super) fn export(
-    name: &str,
-    path: &Path,
-    loaded: &Loaded,
-    texture_size: u32,
-    unit: &str,
-) -> anyhow::Result<Vec<u8>> {
-    let solution = stored_solution(name, loaded)?;
+/// A finished walk-through as one page.
+pub(super) fn export(args: &ExportArgs, loaded: &Loaded) -> anyhow::Result<Vec<u8>> {
+    let (solution, _) = solving::stored(&args.load.scene, loaded, &SolveArgs::default())?;
     let nodes = Nodes::new(&loaded.patches);
-    let about = About { name: &loaded.name, cameras: &loaded.cameras, live: false, unit, texture_size };
+    let about = About {
+        name: &loaded.name,
+        cameras: &loaded.cameras,
+        live: false,
+        unit: args.unit_name.as_str(),
+        texture_size: args.texture_size,
+    };
     let scene = package(&loaded.patches, &nodes, &about);
     let mut walk = WalkLight::new(&loaded.patches, &nodes);
-    let behind = Behind { rays: solution.rays(), error: solution.relative_error() };
+    let (rays, error) = (solution.rays(), solution.relative_error());
+    let behind = Behind { id: id(&loaded.patches, &nodes), rays, error, is_final: true };
     // A single sample of each cell is noise, which only many solutions average.
-    let light = light::light(&walk.of(&solution, FINISHED_ROUNDS), &[], behind);
-    debug_assert!(path.extension().is_some());
+    let light = light::light(&walk.of(&solution, FINISHED_ROUNDS), &[], &behind);
     Ok(twinray_view::page::alone(&loaded.name, &scene, &light).into_bytes())
 }

@@ -36,9 +36,13 @@ impl Viewer {
 
     /// The body of what is asked for.
     fn get(&self, file: &str) -> Vec<u8> {
+        self.ask("GET", file)
+    }
+
+    fn ask(&self, method: &str, file: &str) -> Vec<u8> {
         let mut connection = TcpStream::connect(&self.address).unwrap();
         let address = &self.address;
-        write!(connection, "GET /{TOKEN}/{file} HTTP/1.1\r\nHost: {address}\r\n\r\n").unwrap();
+        write!(connection, "{method} /{TOKEN}/{file} HTTP/1.1\r\nHost: {address}\r\n\r\n").unwrap();
         let mut reader = BufReader::new(connection);
         let (mut line, mut length) = (String::new(), 0);
         while reader.read_line(&mut line).unwrap() > 2 {
@@ -77,6 +81,45 @@ fn a_scene_is_served_while_it_is_solved_and_kept() {
     // The same bytes as without anybody who looks.
     place.done(&[&["solve"], &solve[..], &["-o", "solved.twin"]].concat());
     assert_eq!(place.read("kept.twin"), place.read("solved.twin"));
+}
+
+/// A pause takes nothing of the time that was asked for.
+#[test]
+fn a_paused_solve_has_its_whole_time() {
+    let place = Place::new();
+    let viewer = Viewer::start(&place, &["cornell", "--patches", "2000", "--time", "1.5"]);
+    viewer.ask("POST", "pause");
+    while viewer.status()["state"] != "paused" {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let before = viewer.status();
+    std::thread::sleep(std::time::Duration::from_millis(2000));
+    assert_eq!(viewer.status()["rays"], before["rays"]);
+    viewer.ask("POST", "resume");
+    while viewer.status()["state"] != "finished" {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let after = viewer.status();
+    assert!(after["rays"].as_u64() > before["rays"].as_u64(), "{before}, then {after}");
+    let seconds = after["seconds"].as_f64().unwrap();
+    assert!(seconds >= 1.5, "{after}");
+    assert_eq!(viewer.end(), Some(0));
+}
+
+#[test]
+fn an_address_that_nobody_can_be_told_is_an_error() {
+    let place = Place::new();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+    let Ok(full) = full else { return eprintln!("skipped: this system has no /dev/full") };
+    let run = Command::new(assert_cmd::cargo::cargo_bin!("twinray"))
+        .args(["view", "plates", "--rays", "1000"])
+        .current_dir(place.path(""))
+        .stdout(full)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert_eq!(run.status.code(), Some(2), "{said}");
+    assert!(said.contains("standard output") && !said.contains("panicked"), "{said}");
 }
 
 #[test]

@@ -11,4 +11,4 @@ mod nodes;
 
 pub use light::{Lamp, NodeLight, Sample, WalkLight};
 pub use lobes::{BASIS, basis};
-pub use nodes::{Lattice, NO_NODE, Nodes};
+pub use nodes::{NO_NODE, Nodes};

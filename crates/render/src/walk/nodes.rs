@@ -1,12 +1,12 @@
 //! Where a viewer knows the light: corners of cells, by index arithmetic on the author's triangles.
 //!
-//! A triangle's corners of cells are its slots: a viewer finds the slots around any point from their number alone. Slots
+//! The grid of a triangle's cells ([`twinray_scene::Cells::grid`]) are its slots: a viewer finds the slots around any point from their number alone. Slots
 //! of neighbours at the same place with the same normal share one node, whose light is computed and sent once.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
-use twinray_scene::{Cells, PatchId, PatchScene, Side, SurfaceHit};
+use twinray_scene::{PatchId, PatchScene, Side, SurfaceHit};
 
 /// Stands for a side that has no slots.
 pub const NO_NODE: u32 = u32::MAX;
@@ -20,73 +20,6 @@ const INWARDS: f64 = 0.12;
 /// How high above the surface a wall between neighbours is looked for, as a share of their distance.
 const LIFT: f64 = 0.25;
 
-/// How the slots of a triangle lie.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Lattice {
-    /// Slot (i, j) has weights i/m and j/m of vertices 1 and 2; rows of j follow each other, m + 1 − j slots each.
-    Regular {
-        /// Steps along a side.
-        m: u32,
-    },
-    /// Columns along the longest side, which runs from vertex `first` to the next one. Slot (column, row) lies at
-    /// column/columns of that side, and row/rows of the triangle's height there.
-    Strips {
-        /// Steps along the longest side.
-        columns: u32,
-        /// Steps across.
-        rows: u32,
-        /// Where the longest side begins.
-        first: u8,
-        /// Where the apex's foot divides it.
-        foot: f64,
-    },
-}
-
-impl Lattice {
-    /// The corners of cells.
-    pub fn of(cells: Cells) -> Self {
-        match cells {
-            Cells::Regular { m } => Lattice::Regular { m },
-            Cells::Strips { columns, rows, first, foot } => Lattice::Strips { columns, rows, first, foot },
-        }
-    }
-
-    /// Number of slots.
-    pub fn count(&self) -> u32 {
-        match *self {
-            Lattice::Regular { m } => (m + 1) * (m + 2) / 2,
-            Lattice::Strips { columns, rows, .. } => (columns + 1) * (rows + 1),
-        }
-    }
-
-    /// Barycentric weights of vertices 1 and 2 of all slots, in their order.
-    pub fn places(&self) -> Vec<[f64; 2]> {
-        match *self {
-            Lattice::Regular { m } => {
-                let step = |k: u32| f64::from(k) / f64::from(m);
-                (0..=m).flat_map(|j| (0..=m - j).map(move |i| [step(i), step(j)])).collect()
-            }
-            Lattice::Strips { columns, rows, first, foot } => (0..=columns)
-                .flat_map(|column| (0..=rows).map(move |row| (column, row)))
-                .map(|(column, row)| {
-                    let x = f64::from(column) / f64::from(columns);
-                    let c = f64::from(row) / f64::from(rows) * height_at(x, foot);
-                    let b = x - c * foot;
-                    let mut weights = [0.0; 3];
-                    let at = |k: u8| usize::from((first + k) % 3);
-                    (weights[at(0)], weights[at(1)], weights[at(2)]) = (1.0 - b - c, b, c);
-                    [weights[1], weights[2]]
-                })
-                .collect(),
-        }
-    }
-}
-
-/// Height of a triangle over `x` of its longest side, as a share of the apex's.
-fn height_at(x: f64, foot: f64) -> f64 {
-    if x < foot || foot == 1.0 { x / foot } else { (1.0 - x) / (1.0 - foot) }.clamp(0.0, 1.0)
-}
-
 /// Where the light of a node is asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
@@ -97,8 +30,6 @@ pub(crate) struct Place {
 /// All nodes of a scene.
 #[derive(Debug)]
 pub struct Nodes {
-    /// Per triangle.
-    pub lattices: Vec<Lattice>,
     /// Per triangle: its first slot on the front and on the back, [`NO_NODE`] where there is none.
     pub first_slots: Vec<[u32; 2]>,
     /// Per triangle, for glossy ones: the number among cells of glossy sides of its first cell on the front and on the
@@ -123,9 +54,7 @@ impl Nodes {
     /// Finds the nodes of a scene, O(K).
     pub fn new(scene: &PatchScene) -> Self {
         let triangles = scene.triangle_count() as u32;
-        let lattices: Vec<Lattice> = (0..triangles).map(|t| Lattice::of(scene.cells_of(t))).collect();
         let mut this = Self {
-            lattices,
             first_slots: vec![[NO_NODE; 2]; triangles as usize],
             first_cells: vec![[NO_NODE; 2]; triangles as usize],
             node_of_slot: Vec::new(),
@@ -166,8 +95,7 @@ impl Nodes {
     }
 
     fn add(&mut self, scene: &PatchScene, sides: &[(u32, Side)]) {
-        let found: Vec<Vec<(Key, Place)>> =
-            sides.par_iter().map(|&(t, side)| slots(scene, t, side, &self.lattices[t as usize])).collect();
+        let found: Vec<Vec<(Key, Place)>> = sides.par_iter().map(|&(t, side)| slots(scene, t, side)).collect();
         let mut nodes: HashMap<Key, Vec<u32>> = HashMap::new();
         for (&(t, side), slots) in sides.iter().zip(found) {
             self.first_slots[t as usize][side as usize] = self.node_of_slot.len() as u32;
@@ -197,7 +125,7 @@ fn is_glossy(scene: &PatchScene, triangle: u32, side: Side) -> bool {
 }
 
 /// Slots of one side with what tells them apart and where their light is asked for.
-fn slots(scene: &PatchScene, triangle: u32, side: Side, lattice: &Lattice) -> Vec<(Key, Place)> {
+fn slots(scene: &PatchScene, triangle: u32, side: Side) -> Vec<(Key, Place)> {
     let cells = scene.cells_of(triangle);
     let step = 1.0 / (SAME_PLACE * scene.radius());
     let slot = |[u, v]: [f64; 2]| {
@@ -220,7 +148,7 @@ fn slots(scene: &PatchScene, triangle: u32, side: Side, lattice: &Lattice) -> Ve
         let patch = scene.patch_at(triangle, side, a, b).unwrap_or(PatchId(0));
         (key, Place { patch, hit: SurfaceHit { triangle, side, u, v, t: 0.0 } })
     };
-    lattice.places().into_iter().map(slot).collect()
+    cells.grid().into_iter().map(slot).collect()
 }
 
 /// True if nothing stands between two places of a surface, seen from a little above it.

@@ -1,37 +1,13 @@
-//! The light that viewers are given: where it lies on triangles, and that a furnace's is even.
+//! The light that viewers are given: every side has its slots, and a furnace's is even.
 
 use std::f64::consts::{PI, TAU};
 
-use twinray_render::walk::{Lattice, NO_NODE, Nodes, WalkLight};
-use twinray_scene::{Cells, PatchBudget, PatchOptions, PatchScene, Scene, Surface, Texel, builtin};
+use twinray_render::walk::{NO_NODE, Nodes, WalkLight};
+use twinray_scene::{PatchBudget, PatchOptions, PatchScene, Scene, Surface, Texel, builtin};
 use twinray_solve::{Params, Solver};
 
 fn cut(scene: &Scene, patches: usize) -> PatchScene {
     PatchScene::new(scene, PatchOptions { budget: PatchBudget::Count(patches), two_sided: false }).unwrap()
-}
-
-#[test]
-fn slots_are_as_many_as_they_say_and_within_their_triangle() {
-    let strips = [(1, 1, 0, 0.3), (7, 2, 1, 0.0), (5, 3, 2, 1.0)].map(|(columns, rows, first, foot)| Cells::Strips {
-        columns,
-        rows,
-        first,
-        foot,
-    });
-    for cells in [1, 2, 9].map(|m| Cells::Regular { m }).into_iter().chain(strips) {
-        let lattice = Lattice::of(cells);
-        let places = lattice.places();
-        assert_eq!(places.len() as u32, lattice.count(), "{cells:?}");
-        for [u, v] in &places {
-            assert!(*u > -1e-9 && *v > -1e-9 && u + v < 1.0 + 1e-9, "{cells:?}: ({u}, {v})");
-        }
-        for corner in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
-            let near = |p: &&[f64; 2]| (p[0] - corner[0]).abs() + (p[1] - corner[1]).abs() < 1e-9;
-            // The apex of a sliver is a slot only where a column ends at its foot.
-            let is_apex = matches!(cells, Cells::Strips { foot, .. } if foot > 0.0 && foot < 1.0);
-            assert!(is_apex || places.iter().any(|p| near(&p)), "{cells:?} lacks {corner:?}");
-        }
-    }
 }
 
 #[test]
@@ -47,10 +23,10 @@ fn every_side_with_patches_has_its_slots_and_glossy_ones_come_first() {
             if first == NO_NODE {
                 continue;
             }
-            slots += nodes.lattices[t].count();
+            slots += scene.cells_of(t as u32).grid_count();
             let is_glossy = nodes.first_cells[t][side] != NO_NODE;
             assert_eq!(is_glossy, (first as usize) < nodes.glossy_slots, "triangle {t}");
-            for slot in first..first + nodes.lattices[t].count() {
+            for slot in first..first + scene.cells_of(t as u32).grid_count() {
                 let node = nodes.node_of_slot[slot as usize] as usize;
                 assert_eq!(is_glossy, node < nodes.glossy_nodes, "triangle {t}");
             }

@@ -99,13 +99,12 @@ const rested = (page) =>
         timeout: 120_000,
     });
 
-/** Until the solver has finished and the page has its light. @param {Page} page */
-async function finished(page) {
-    await page.waitForFunction("document.querySelector('#solve-state').textContent.includes('Finished')", {
-        timeout: 120_000,
-    });
-    await wait(1500);
-}
+/** Until the solver has finished and the page has its last light. @param {Page} page */
+const finished = (page) =>
+    page.waitForFunction(
+        "document.querySelector('#solve-state').textContent.includes('Finished') && window.twinray.renderer.state.isFinal",
+        { timeout: 120_000 },
+    );
 
 /**
  * The page's picture as the shader makes it, without panels, and its size.
