@@ -24,9 +24,12 @@ const FEW_FRAMES = 16;
 const SLOW = 45;
 /** Log-average luminance becomes this: crates/render/src/display/exposure.rs. */
 const MIDDLE_GREY = 0.2;
-/** How many updates' worth of trust what is known of all directions has against remembered samples: a fit, by which the
- *  mean of few samples is held back, and that of many is believed. */
-const PRIOR = 40;
+/**
+ * How many updates of samples weigh as much as what is known of all directions. Measured on the hall's glossy floor, in squares
+ * of 8 pixels: one update leaves 96 % of noise, what is known is 2.5 % off. The ratio of the squares is the weight with the
+ * least error; samples never make a view worse, and are all that counts in the end.
+ */
+const PRIOR = 1500;
 /** Points across the film at which automatic exposure looks. */
 const METER = 48;
 const CURVES = ["agx", "aces", "reinhard", "none"];
@@ -48,8 +51,12 @@ export class Renderer {
     /** @type {Pose|null} */
     #view = null;
     #requested = 0;
-    /** Frames in the mean, and of them since samples last came. */
+    /** Frames in the mean. */
     #frames = 0;
+    /** Frames in the mean of samples: it goes on over new light, since only many of them say anything. */
+    #sampledFrames = 0;
+    /** Frames ever drawn. */
+    #drawn = 0;
     #moving = false;
     /** Exposure in use and wanted, EV; what frames were multiplied by. */
     #exposure = NaN;
@@ -252,8 +259,13 @@ export class Renderer {
 
     #restart() {
         this.#frames = 0;
-        this.#updates = this.resources?.light.hasSamples ? 1 : 0;
+        this.#forgetSamples();
         this.#request();
+    }
+
+    #forgetSamples() {
+        this.#sampledFrames = 0;
+        this.#updates = this.resources?.light.hasSamples ? 1 : 0;
     }
 
     #request() {
@@ -280,7 +292,10 @@ export class Renderer {
         const { gl } = this;
         if (coarse === 1) {
             this.#frames += 1;
+            this.#drawn += 1;
             const share = 1 / this.#frames;
+            const { hasSamples } = this.resources.light;
+            if (hasSamples) this.#sampledFrames += 1;
             this.means.reverse();
             const [to, from] = this.means;
             gl.bindFramebuffer(gl.FRAMEBUFFER, to.framebuffer);
@@ -293,7 +308,7 @@ export class Renderer {
                     uSampledMean: from.textures[1],
                 },
                 // A light that is finished has no samples; what they have shown of this view stays.
-                uShare: [share, this.resources.light.hasSamples || this.#frames === 1 ? share : 0],
+                uShare: [share, hasSamples ? 1 / this.#sampledFrames : Number(this.#sampledFrames === 0)],
             });
         }
         const settled = this.#meter(moving);
@@ -315,6 +330,8 @@ export class Renderer {
             : 2 ** (this.options.exposure ?? (Number.isNaN(this.#exposure) ? this.#guess() : this.#exposure));
         const far = Math.abs(Math.log2(wanted / this.#baked));
         if (this.#frames === 0 || far > 2) {
+            // What was added up was multiplied by another.
+            if (this.#baked !== wanted) this.#forgetSamples();
             this.#baked = wanted;
             this.#frames = 0;
         }
@@ -333,7 +350,8 @@ export class Renderer {
         const { gl, walk, resources, options } = this;
         const [width, height] = size;
         // The first frame is through the middle of pixels; the others make their mean smooth.
-        const jitter = [2, 3].map((base, k) => ((halton(this.#frames, base) - 0.5) * 2) / size[k]);
+        const place = this.#frames === 0 ? 0 : 1 + (this.#drawn % 1024);
+        const jitter = [2, 3].map((base, k) => ((halton(place, base) - 0.5) * 2) / size[k]);
         const { viewProjection, ray } = matrices(view, this.canvas.width / this.canvas.height, walk, jitter, [1, 1]);
         gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame?.framebuffer ?? null);
         gl.viewport(0, 0, width, height);
@@ -351,7 +369,7 @@ export class Renderer {
             uMode: options.falseColour ? 1 : 0,
             uCells: options.cells ? 1 : 0,
             uSampled: light.hasSamples ? 1 : 0,
-            uSeed: [this.#frames * 1.37, this.#frames * 2.11, this.#frames + 0.5],
+            uSeed: [this.#drawn * 1.37, this.#drawn * 2.11, this.#drawn + 0.5],
         };
         this.#drawSurfaces(this.programs.surface, viewProjection, (batch) => !batch.seeThrough, uniforms);
         gl.enable(gl.DEPTH_TEST);

@@ -136,7 +136,6 @@ layout(location = 1) out vec4 oSampled;
 
 const float PI = 3.141592653589793;
 const float BRIGHTEST = 12.0;
-const float FIREFLY = 8.0;
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 /* What half floats hold: one infinite or undefined fragment would stay in a mean for good. */
 vec3 finite(vec3 c) { return any(isnan(c)) ? vec3(0.0) : clamp(c, -60000.0, 60000.0); }
@@ -321,8 +320,6 @@ void main() {
                 vec3 wi = fromOctahedron(octahedral);
                 /* What is shown is a mean of what is known and of samples: n of them count n to PRIOR of renderer.js. */
                 sampled = brought * lobe(l, n, wi, wo) - mirrored;
-                /* Rare bright ones would stay as dots for hundreds of updates. */
-                sampled *= min(1.0, FIREFLY * luminance(known) / max(abs(luminance(sampled)), 1e-30));
             }
         }
     }

@@ -269,8 +269,8 @@ test("a point says its illuminance, which is that of the solution", { skip }, as
 });
 
 test("a killed server leaves the light, and a restarted one is found again", { skip }, async () => {
-    const args = ["cornell", "--patches", "4k", "--rays", "1M", "--token", TOKEN];
-    const first = await view(...args);
+    const args = ["cornell", "--rays", "1M", "--token", TOKEN];
+    const first = await view(...args, "--patches", "4k");
     const port = new URL(first.url).port;
     const { page } = await open(first.url);
     await finished(page);
@@ -279,10 +279,16 @@ test("a killed server leaves the light, and a restarted one is found again", { s
     await page.waitForFunction(`!${state}.includes('Finished')`, { timeout: 20_000 });
     assert.match(String(await page.evaluate(state)), /lost/i);
     assert.ok(await page.evaluate("window.twinray.renderer.state.frames > 0"), "the picture stays");
-    const second = await view(...args, "--port", port);
+    const second = await view(...args, "--patches", "4k", "--port", port);
     assert.equal(second.url, first.url);
     await page.waitForFunction(`${state}.includes('Finished')`, { timeout: 30_000 });
-    second.server.kill("SIGINT");
+    // Other cells are another scene to a page, which begins anew.
+    second.server.kill("SIGKILL");
+    await new Promise((done) => second.server.on("exit", done));
+    const third = await view(...args, "--port", port, "--patches", "6k");
+    await page.waitForFunction("window.twinray?.walk.stats.cells > 5000", { timeout: 30_000 });
+    await finished(page);
+    third.server.kill("SIGINT");
     await page.close();
 });
 
