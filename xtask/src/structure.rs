@@ -13,8 +13,12 @@ const TABLE: &[(&str, &[&str])] = &[
     ("twinray-scene", &["twinray-rays"]),
     ("twinray-solve", &["twinray-scene"]),
     ("twinray-render", &["twinray-scene", "twinray-solve"]),
+    ("twinray-bake", &["twinray-scene", "twinray-solve", "twinray-render"]),
     ("twinray-format", &["twinray-scene", "twinray-solve", "twinray-render"]),
-    ("twinray", &["twinray-rays", "twinray-scene", "twinray-solve", "twinray-render", "twinray-format"]),
+    (
+        "twinray",
+        &["twinray-rays", "twinray-scene", "twinray-solve", "twinray-render", "twinray-bake", "twinray-format"],
+    ),
     ("twinray-view", &["twinray"]),
     ("twinray-cli", &["twinray", "twinray-view"]),
     ("twinray-validate", &["twinray"]),
@@ -24,7 +28,7 @@ const TABLE: &[(&str, &[&str])] = &[
 ];
 
 /// Crates that compute: they see no file, clock, terminal or environment.
-const LIBRARIES: [&str; 5] = ["rays", "scene", "solve", "render", "format"];
+const LIBRARIES: [&str; 6] = ["rays", "scene", "solve", "render", "bake", "format"];
 
 /// What the libraries must not name outside their tests.
 const OUTSIDE: [&str; 11] = [

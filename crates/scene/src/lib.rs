@@ -36,7 +36,7 @@ pub use camera::{Camera, Lens, Projection};
 pub use camera_path::{CameraKey, CameraPath};
 pub use cells::Cells;
 pub use estimate::{Estimate, estimate};
-pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side};
+pub use patch::{PatchBudget, PatchError, PatchId, PatchOptions, PatchScene, Side, TriangleSource, sources};
 pub use punctual::PointLight;
 pub use rgb::Rgb;
 pub use surface::SurfacePoint;

@@ -583,9 +583,30 @@ pub(crate) fn rare_attributes(scene: &Scene) -> [bool; 2] {
     ]
 }
 
+/// Where the triangles of a scene's [`PatchScene`] come from, in their order.
+pub fn sources(scene: &Scene) -> Vec<TriangleSource> {
+    let mut found = Vec::new();
+    if let Some((centre, _)) = bounds(scene) {
+        place(scene, centre, &mut |placed| found.push(placed.source));
+    }
+    found
+}
+
+/// Where a triangle comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TriangleSource {
+    /// Index into [`Scene::instances`].
+    pub instance: u32,
+    /// Index into the triangles of its mesh.
+    pub triangle: u32,
+    /// Whether its last two corners are exchanged: those of the mesh run clockwise where it stands.
+    pub mirrored: bool,
+}
+
 /// A triangle where it stands.
 pub(crate) struct Placed<'a> {
     pub mesh: &'a Mesh,
+    pub source: TriangleSource,
     /// Its vertices in the mesh, counter-clockwise from the front in the world.
     pub corner: [usize; 3],
     /// Its vertices relative to the scene's centre.
@@ -611,14 +632,14 @@ impl Placed<'_> {
 /// Calls `each` with every triangle that a ray can meet, in order; returns the number of those left out.
 pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) -> usize {
     let mut left_out = 0;
-    for instance in &scene.instances {
+    for (number, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
         let place = instance.transform;
         // Mirrored instances keep their front side outside: the winding follows the determinant (glTF 2.0, 3.5.2).
         let mirrored = place.matrix3.determinant() < 0.0;
         let normal_matrix = normal_matrix(place.matrix3);
         let world: Vec<DVec3> = mesh.positions.iter().map(|p| place.transform_point3(vec(*p)) - centre).collect();
-        for corner in &mesh.triangles {
+        for (triangle, corner) in mesh.triangles.iter().enumerate() {
             let order = if mirrored { [0, 2, 1] } else { [0, 1, 2] };
             let corner = order.map(|k| corner[k] as usize);
             let vertices = corner.map(|k| world[k].as_vec3().to_array());
@@ -629,7 +650,8 @@ pub(crate) fn place(scene: &Scene, centre: DVec3, each: &mut dyn FnMut(Placed)) 
                 left_out += 1;
                 continue;
             }
-            each(Placed { mesh, corner, vertices, across, normal_matrix, matrix: place.matrix3 });
+            let source = TriangleSource { instance: number as u32, triangle: triangle as u32, mirrored };
+            each(Placed { mesh, source, corner, vertices, across, normal_matrix, matrix: place.matrix3 });
         }
     }
     left_out

@@ -2,7 +2,7 @@
 //!
 //! Data flows one way: [`mod@format`] reads bytes into a [`scene::Scene`]; [`scene::PatchScene`] cuts it into patches;
 //! [`solve::Solver`] shoots bi-directional rays; [`solve::Solution`] is the light of the whole scene; [`render`]
-//! makes pictures of it; [`mod@format`] writes them.
+//! makes pictures of it, [`bake`] textures for its own meshes; [`mod@format`] writes them.
 //!
 //! ```
 //! use twinray::render::{self, Exposure, PictureOptions, ToneCurve};
@@ -27,6 +27,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub use twinray_bake as bake;
 pub use twinray_format as format;
 pub use twinray_render as render;
 pub use twinray_scene as scene;

@@ -6,9 +6,10 @@
 //! patches to look even, its end is a point like the first. No patch is seen directly: shadows and textures are sharp,
 //! and only light of two bounces and more is as smooth as patches are.
 //! `sample` follows one camera ray; `tile` lets neighbours share what their gather rays find; `places` learn which lamps
-//! light them, and with `guide` from where light comes; `spread` gives to many what was too much for one; `pass` decides how many rays each place gets.
+//! light them, and with `guide` from where light comes; `spread` gives to many what was too much for one; `pass` decides how many rays each place gets. `irradiance` asks at points of surfaces instead.
 
 mod guide;
+mod irradiance;
 mod pass;
 mod places;
 mod sample;
@@ -23,6 +24,8 @@ use crate::picture::Picture;
 use crate::sums::{self, PixelSums};
 use places::Places;
 use sample::Estimator;
+
+pub use irradiance::IrradianceGather;
 
 /// Settings of a gather.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,70 @@
+//! The light at a point of a surface, as texels and vertices ask for it.
+
+use twinray_render::{IrradianceGather, Reconstruction};
+use twinray_scene::{PatchScene, Rgb, Side, SurfaceHit};
+use twinray_solve::Solution;
+
+/// Whence the light of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// The mean of its cell: what arrived there, as it is.
+    Cells,
+    /// Smooth between cells of the same surface that see each other.
+    Smooth,
+    /// So many rays gather it anew from all that the solution knows.
+    Gathered(u32),
+}
+
+/// The light of a solution at any point.
+pub struct SurfaceLight<'a> {
+    patches: &'a PatchScene,
+    source: Source<'a>,
+    seed: u64,
+}
+
+enum Source<'a> {
+    Cells(&'a Solution),
+    Smooth(Box<Reconstruction<'a>>),
+    Gathered(Box<IrradianceGather<'a>>, u32),
+}
+
+impl<'a> SurfaceLight<'a> {
+    /// The light of `solution`; `seed` is that of gather rays.
+    pub fn new(patches: &'a PatchScene, solution: &'a Solution, quality: Quality, seed: u64) -> Self {
+        let source = match quality {
+            Quality::Cells => Source::Cells(solution),
+            Quality::Smooth => Source::Smooth(Box::new(Reconstruction::new(patches, solution))),
+            Quality::Gathered(rays) => Source::Gathered(Box::new(IrradianceGather::new(patches, solution)), rays),
+        };
+        Self { patches, source, seed }
+    }
+
+    /// Rays that one piece of surface is to have in all.
+    pub fn rays(&self) -> u32 {
+        if let Source::Gathered(_, rays) = self.source { rays } else { 1 }
+    }
+
+    /// Irradiance, W·m⁻² (or lux), on one side of a triangle at barycentric (`u`, `v`): `None` where the side absorbs, or
+    /// something stands on the point, so that nothing can light it. `key` names the point and `rays` is its share of gather rays.
+    pub fn at(&self, triangle: u32, side: Side, [u, v]: [f64; 2], key: u64, rays: u32) -> Option<Rgb> {
+        let patch = self.patches.patch_at(triangle, side, u, v)?;
+        let hit = SurfaceHit { triangle, side, u, v, t: 0.0 };
+        if self.is_covered(&hit) {
+            return None;
+        }
+        Some(match &self.source {
+            Source::Cells(solution) => solution.irradiance(patch),
+            Source::Smooth(reconstruction) => reconstruction.smooth(patch, &hit).irradiance,
+            Source::Gathered(gather, _) => gather.at(patch, &hit, rays, self.seed, key),
+        })
+    }
+
+    /// True if what is met along the normal is the absorbing back of something that the point lies within.
+    fn is_covered(&self, hit: &SurfaceHit) -> bool {
+        let Some(patch) = self.patches.patch_at(hit.triangle, hit.side, hit.u, hit.v) else { return true };
+        let point = self.patches.point_of(hit.triangle, hit.u, hit.v);
+        let met = self.patches.trace_from(patch, point, self.patches.normal(patch));
+        let touching = 0.02 * self.patches.cell_area(patch).sqrt();
+        met.is_some_and(|m| m.t < touching || (m.side == Side::Back && self.patches.patch_of(&m).is_none()))
+    }
+}

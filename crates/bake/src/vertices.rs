@@ -1,0 +1,170 @@
+//! Light at vertices: values whose linear interpolation over the triangles is nearest to the light, in the sense of least
+//! squares (Kavan, Bargteil, Sloan, "Least squares vertex baking", EGSR 2011), a little smoothed where triangles say little.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+use twinray_scene::{PatchScene, Rgb, Scene};
+use twinray_solve::Solution;
+
+use crate::atlas::{AtlasError, area};
+use crate::light::{Quality, SurfaceLight};
+use crate::parts::{Part, parts};
+
+/// Weight of the smoothness of neighbours beside the light itself.
+const SMOOTH: f64 = 0.02;
+const STEPS: usize = 40;
+/// Points at which the light of a face is asked for, at least and at most.
+const POINTS: [f64; 2] = [16.0, 1024.0];
+
+/// Irradiance at the vertices of the meshes.
+#[derive(Clone, Debug)]
+pub struct VertexLight {
+    /// Sides of meshes that have light.
+    pub parts: Vec<Part>,
+    /// For each part, by vertex of its mesh: irradiance, W·m⁻² (or lux); black for vertices of no face.
+    pub irradiance: Vec<Vec<[f32; 3]>>,
+}
+
+/// Bakes the light of `solution` into vertices.
+///
+/// # Errors
+/// [`AtlasError::Nothing`] if no surface reflects diffusely.
+pub fn bake_vertices(
+    scene: &Scene,
+    patches: &PatchScene,
+    solution: &Solution,
+    quality: Quality,
+    seed: u64,
+) -> Result<VertexLight, AtlasError> {
+    let parts = parts(scene, patches, solution);
+    if parts.is_empty() {
+        return Err(AtlasError::Nothing);
+    }
+    let light = SurfaceLight::new(patches, solution, quality, seed);
+    let irradiance = parts
+        .iter()
+        .map(|part| {
+            let mesh = &scene.meshes[scene.instances[part.instance].mesh];
+            fit(patches, part, mesh.positions.as_slice(), mesh.normals.as_deref(), &light)
+        })
+        .collect();
+    Ok(VertexLight { parts, irradiance })
+}
+
+/// What a face adds to the sums of its corners.
+struct Moments {
+    area: f64,
+    /// ∫ φ E over the face.
+    right: [Rgb; 3],
+}
+
+fn fit(
+    patches: &PatchScene,
+    part: &Part,
+    positions: &[[f32; 3]],
+    normals: Option<&[[f32; 3]]>,
+    light: &SurfaceLight<'_>,
+) -> Vec<[f32; 3]> {
+    // Vertices that were split for texture coordinates alone are one.
+    let mut number = HashMap::new();
+    let mut variables = 0;
+    let variable: Vec<usize> = (0..positions.len())
+        .map(|k| {
+            let key = (positions[k].map(f32::to_bits), normals.map(|n| n[k].map(f32::to_bits)));
+            *number.entry(key).or_insert_with(|| {
+                variables += 1;
+                variables - 1
+            })
+        })
+        .collect();
+    let found: Vec<Moments> = part.faces.par_iter().map(|face| moments(patches, part, face.triangle, light)).collect();
+    let corners: Vec<[usize; 3]> = part.faces.iter().map(|f| f.corners.map(|k| variable[k as usize])).collect();
+    let (mut right, mut mass) = (vec![Rgb::BLACK; variables], vec![0.0; variables]);
+    for (corner, moments) in corners.iter().zip(&found) {
+        for k in 0..3 {
+            right[corner[k]] += moments.right[k];
+            mass[corner[k]] += moments.area / 3.0;
+        }
+    }
+    // Start from weighted means, which are smooth and positive.
+    let start: Vec<Rgb> = right.iter().zip(&mass).map(|(r, &m)| if m > 0.0 { *r / m } else { Rgb::BLACK }).collect();
+    let areas: Vec<f64> = found.iter().map(|m| m.area).collect();
+    let mut values = [0, 1, 2].map(|c| {
+        let channel = |v: &[Rgb]| -> Vec<f64> { v.iter().map(|x| x.to_array()[c]).collect() };
+        solve(&corners, &areas, &channel(&right), channel(&start), &mass)
+    });
+    values.iter_mut().flatten().for_each(|v| *v = v.max(0.0));
+    variable.iter().map(|&v| [0, 1, 2].map(|c| values[c][v] as f32)).collect()
+}
+
+/// Sums over a face, with points spread evenly over it.
+fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLight<'_>) -> Moments {
+    let cells = f64::from(patches.cells_of(triangle).count());
+    let count = (4.0 * cells).clamp(POINTS[0], POINTS[1]) as u32;
+    let (mut right, mut lit) = ([Rgb::BLACK; 3], [0.0; 3]);
+    for k in 0..count {
+        // The plastic sequence, folded into the triangle (Roberts 2018).
+        let place = |step: f64| (f64::from(k) * step + 0.5).fract();
+        let (mut s, mut t) = (place(0.754_877_666_246_692_7), place(0.569_840_290_998_053_2));
+        if s + t > 1.0 {
+            (s, t) = (1.0 - s, 1.0 - t);
+        }
+        let weights = [1.0 - s - t, s, t];
+        let rays = light.rays().div_ceil(count);
+        let key = (u64::from(triangle) << 20) ^ u64::from(k);
+        let Some(there) = light.at(triangle, part.side, part.place(weights), key, rays) else { continue };
+        for c in 0..3 {
+            right[c] += there * weights[c];
+            lit[c] += weights[c];
+        }
+    }
+    let area = area(patches, triangle);
+    // What stands on the face hides its share of every corner's light.
+    let total: f64 = lit.iter().sum();
+    let area = area * total / f64::from(count);
+    let scale = if total > 0.0 { area / total } else { 0.0 };
+    Moments { area, right: right.map(|r| r * scale) }
+}
+
+/// Minimises ∫ (Σ φ x − E)² + smoothness by conjugate gradients.
+fn solve(corners: &[[usize; 3]], areas: &[f64], right: &[f64], start: Vec<f64>, mass: &[f64]) -> Vec<f64> {
+    let apply = |x: &[f64]| {
+        let mut y = vec![0.0; x.len()];
+        for (corner, area) in corners.iter().zip(areas) {
+            let sum: f64 = corner.iter().map(|&k| x[k]).sum();
+            for &k in corner {
+                // Mass matrix of linear elements, and differences to the face's mean.
+                y[k] += area / 12.0 * (sum + x[k]) + SMOOTH * area * (x[k] - sum / 3.0);
+            }
+        }
+        // Vertices of no lit face stay as they are.
+        y.iter_mut().zip(x).zip(mass).for_each(|((y, x), m)| if *m == 0.0 { *y = *x });
+        y
+    };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut x = start;
+    let image = apply(&x);
+    let mut residual: Vec<f64> =
+        right.iter().zip(&image).zip(mass).map(|((r, a), m)| if *m == 0.0 { 0.0 } else { r - a }).collect();
+    let precondition = |r: &[f64]| -> Vec<f64> { r.iter().zip(mass).map(|(r, m)| if *m > 0.0 { r / m } else { 0.0 }).collect() };
+    let mut z = precondition(&residual);
+    let mut direction = z.clone();
+    let mut rest = dot(&residual, &z);
+    let target = 1e-14 * rest;
+    for _ in 0..STEPS {
+        if !(rest > target) {
+            break;
+        }
+        let image = apply(&direction);
+        let step = rest / dot(&direction, &image);
+        x.iter_mut().zip(&direction).for_each(|(x, d)| *x += step * d);
+        residual.iter_mut().zip(&image).for_each(|(r, i)| *r -= step * i);
+        z = precondition(&residual);
+        let next = dot(&residual, &z);
+        let ratio = next / rest;
+        direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + ratio * *d);
+        rest = next;
+    }
+    x
+}

@@ -1,0 +1,5 @@
+//! Tests of the whole crate.
+
+mod lightmap;
+mod scenes;
+mod vertices;

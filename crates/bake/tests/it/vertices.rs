@@ -1,0 +1,34 @@
+//! Light at vertices.
+
+use twinray_bake::{Quality, bake_vertices};
+use twinray_scene::builtin;
+
+use crate::scenes::{cut, solve};
+
+/// Values at vertices have the power of the solution, and are nowhere negative.
+#[test]
+fn vertices_have_the_power_of_the_solution() {
+    let scene = builtin::cornell(false);
+    let patches = cut(&scene, 0.05);
+    let solution = solve(&patches, 2_000_000);
+    let baked = bake_vertices(&scene, &patches, &solution, Quality::Smooth, 1).expect("light");
+    let (mut found, mut truth, mut area_of_parts) = (0.0, 0.0, 0.0);
+    for (part, values) in baked.parts.iter().zip(&baked.irradiance) {
+        for face in &part.faces {
+            let [a, b, c] = patches.corners(face.triangle);
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let luminance = |k: u32| {
+                let [r, g, b] = values[k as usize].map(f64::from);
+                assert!(r >= 0.0 && g >= 0.0 && b >= 0.0);
+                0.2126 * r + 0.7152 * g + 0.0722 * b
+            };
+            found += area * face.corners.map(luminance).iter().sum::<f64>() / 3.0;
+            area_of_parts += area;
+        }
+    }
+    for patch in patches.patches() {
+        truth += patches.area(patch) * solution.irradiance(patch).luminance();
+    }
+    assert!((area_of_parts / patches.total_area() - 1.0).abs() < 1e-6);
+    assert!((found / truth - 1.0).abs() < 0.02, "{found} against {truth}");
+}

@@ -1,0 +1,57 @@
+//! Irradiance at any point by rays that gather what a solution knows: bakes at the resolution of their texels.
+
+use twinray_scene::brdf::{Brdf, Scatter};
+use twinray_scene::sample::PixelSample;
+use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
+use twinray_solve::Solution;
+
+use super::guide::Aim;
+use super::sample::{Estimator, Point};
+use crate::vertex::Vertex;
+
+/// Gathers irradiance.
+pub struct IrradianceGather<'a> {
+    estimator: Estimator<'a>,
+    scene: &'a PatchScene,
+}
+
+impl<'a> IrradianceGather<'a> {
+    /// Of the light of `solution`.
+    pub fn new(scene: &'a PatchScene, solution: &'a Solution) -> Self {
+        Self { estimator: Estimator::new(scene, solution), scene }
+    }
+
+    /// Irradiance, W·m⁻² (or lux), at a hit on `patch`: the mean of `rays` rays, each with a shadow ray. `seed` and `key`,
+    /// which names the point, choose them.
+    pub fn at(&self, patch: PatchId, hit: &SurfaceHit, rays: u32, seed: u64, key: u64) -> Rgb {
+        let scene = self.scene;
+        let geometric = scene.normal(patch);
+        let normal = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
+        // What a white Lambertian surface sends out is its irradiance over π.
+        let scatter = Scatter { brdf: Brdf::Lambertian { reflectance: Rgb::WHITE }, specular: None };
+        let vertex = Vertex {
+            patch,
+            point: scene.point_of(hit.triangle, hit.u, hit.v),
+            geometric,
+            normal,
+            scatter,
+            inside: false,
+            is_clear: false,
+        };
+        let brdf = scatter.brdf.towards(normal, normal);
+        let point = Point { vertex, aim: Aim { brdf, guide: None }, throughput: Rgb::WHITE, expected: Rgb::BLACK };
+        let shadows = self.estimator.shadows();
+        let mut sum = Rgb::BLACK;
+        for index in 0..rays.max(1) {
+            let mut numbers = PixelSample::new(seed, key, index);
+            sum += self.estimator.lit(&point, shadows, &mut numbers).0;
+            numbers.jump(0);
+            let u = numbers.pair();
+            if let Some(g) = self.estimator.gather(&point, u, shadows, &mut numbers) {
+                let scattered = g.scattered.map_or(Rgb::BLACK, |s| s.0);
+                sum += brdf.eval(g.direction) * (normal.dot(g.direction) / g.density) * (g.emitted + scattered + g.other);
+            }
+        }
+        sum * (std::f64::consts::PI / f64::from(rays.max(1)))
+    }
+}
