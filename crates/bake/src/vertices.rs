@@ -14,6 +14,8 @@ use crate::parts::{Part, parts};
 /// Weight of the smoothness of neighbours beside the light itself.
 const SMOOTH: f64 = 0.02;
 const STEPS: usize = 40;
+/// Rounds in which vertices may be held at 0.
+const ROUNDS: usize = 8;
 /// Points at which the light of a face is asked for, at least and at most.
 const POINTS: [f64; 2] = [16.0, 1024.0];
 
@@ -90,11 +92,21 @@ fn fit(
     // Start from weighted means, which are smooth and positive.
     let start: Vec<Rgb> = right.iter().zip(&mass).map(|(r, &m)| if m > 0.0 { *r / m } else { Rgb::BLACK }).collect();
     let areas: Vec<f64> = found.iter().map(|m| m.area).collect();
-    let mut values = [0, 1, 2].map(|c| {
+    let values = [0, 1, 2].map(|c| {
         let channel = |v: &[Rgb]| -> Vec<f64> { v.iter().map(|x| x.to_array()[c]).collect() };
-        solve(&corners, &areas, &channel(&right), channel(&start), &mass)
+        let (right, mut x) = (channel(&right), channel(&start));
+        // No light is negative: what would be is held at 0, and the rest is fitted again.
+        let mut free: Vec<bool> = mass.iter().map(|&m| m > 0.0).collect();
+        for _ in 0..ROUNDS {
+            x = solve(&corners, &areas, &right, x, &mass, &free);
+            let negative: Vec<usize> = (0..x.len()).filter(|&k| x[k] < 0.0).collect();
+            negative.iter().for_each(|&k| (x[k], free[k]) = (0.0, false));
+            if negative.is_empty() {
+                break;
+            }
+        }
+        x
     });
-    values.iter_mut().flatten().for_each(|v| *v = v.max(0.0));
     variable.iter().map(|&v| [0, 1, 2].map(|c| values[c][v] as f32)).collect()
 }
 
@@ -127,8 +139,15 @@ fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLigh
     Moments { area, right: right.map(|r| r * scale) }
 }
 
-/// Minimises ∫ (Σ φ x − E)² + smoothness by conjugate gradients.
-fn solve(corners: &[[usize; 3]], areas: &[f64], right: &[f64], start: Vec<f64>, mass: &[f64]) -> Vec<f64> {
+/// Minimises ∫ (Σ φ x − E)² + smoothness over the vertices that are `free`, by conjugate gradients.
+fn solve(
+    corners: &[[usize; 3]],
+    areas: &[f64],
+    right: &[f64],
+    start: Vec<f64>,
+    mass: &[f64],
+    free: &[bool],
+) -> Vec<f64> {
     let apply = |x: &[f64]| {
         let mut y = vec![0.0; x.len()];
         for (corner, area) in corners.iter().zip(areas) {
@@ -138,16 +157,14 @@ fn solve(corners: &[[usize; 3]], areas: &[f64], right: &[f64], start: Vec<f64>, 
                 y[k] += area / 12.0 * (sum + x[k]) + SMOOTH * area * (x[k] - sum / 3.0);
             }
         }
-        // Vertices of no lit face stay as they are.
-        y.iter_mut().zip(x).zip(mass).for_each(|((y, x), m)| if *m == 0.0 { *y = *x });
         y
     };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut x = start;
     let image = apply(&x);
-    let mut residual: Vec<f64> =
-        right.iter().zip(&image).zip(mass).map(|((r, a), m)| if *m == 0.0 { 0.0 } else { r - a }).collect();
-    let precondition = |r: &[f64]| -> Vec<f64> { r.iter().zip(mass).map(|(r, m)| if *m > 0.0 { r / m } else { 0.0 }).collect() };
+    let held = |r: Vec<f64>| -> Vec<f64> { r.into_iter().zip(free).map(|(r, &f)| if f { r } else { 0.0 }).collect() };
+    let mut residual = held(right.iter().zip(&image).map(|(r, a)| r - a).collect());
+    let precondition = |r: &[f64]| held(r.iter().zip(mass).map(|(r, m)| r / m).collect());
     let mut z = precondition(&residual);
     let mut direction = z.clone();
     let mut rest = dot(&residual, &z);
@@ -156,7 +173,7 @@ fn solve(corners: &[[usize; 3]], areas: &[f64], right: &[f64], start: Vec<f64>, 
         if !(rest > target) {
             break;
         }
-        let image = apply(&direction);
+        let image = held(apply(&direction));
         let step = rest / dot(&direction, &image);
         x.iter_mut().zip(&direction).for_each(|(x, d)| *x += step * d);
         residual.iter_mut().zip(&image).for_each(|(r, i)| *r -= step * i);

@@ -1,15 +1,20 @@
 //! Light at vertices.
 
 use twinray_bake::{Quality, bake_vertices};
-use twinray_scene::builtin;
-
-use crate::scenes::{cut, solve};
+use crate::scenes::{Boxes, cut, solve};
 
 /// Values at vertices have the power of the solution, and are nowhere negative.
 #[test]
 fn vertices_have_the_power_of_the_solution() {
-    let scene = builtin::cornell(false);
-    let patches = cut(&scene, 0.05);
+    // Nothing stands on anything: what is covered has no light of its own, and would count here. Walls glow: near a small lamp
+    // the best fit is held at 0 in places, and has more power than the light.
+    let mut room = Boxes::new();
+    let (glowing, grey) = (room.material(0.6, 1.0), room.material(0.3, 0.0));
+    room.add([0.0, 0.0, 0.0], [4.0, 2.5, 3.0], glowing, true);
+    room.add([1.0, 1.8, 1.0], [1.5, 2.1, 1.5], grey, false);
+    room.add([2.0, 0.5, 1.0], [2.5, 1.0, 1.5], grey, false);
+    let scene = room.0;
+    let patches = cut(&scene, 0.1);
     let solution = solve(&patches, 2_000_000);
     let baked = bake_vertices(&scene, &patches, &solution, Quality::Smooth, 1).expect("light");
     let (mut found, mut truth, mut area_of_parts) = (0.0, 0.0, 0.0);
@@ -30,5 +35,5 @@ fn vertices_have_the_power_of_the_solution() {
         truth += patches.area(patch) * solution.irradiance(patch).luminance();
     }
     assert!((area_of_parts / patches.total_area() - 1.0).abs() < 1e-6);
-    assert!((found / truth - 1.0).abs() < 0.02, "{found} against {truth}");
+    assert!((found / truth - 1.0).abs() < 0.005, "{found} against {truth}");
 }
