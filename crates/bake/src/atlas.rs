@@ -11,6 +11,7 @@ use uvunwrap::{Density, MeshInput, Options};
 
 use crate::overlap::{self, Fault};
 use crate::parts::Part;
+use crate::watch::Cancelled;
 
 /// How fine texels are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +53,9 @@ pub enum AtlasError {
     /// The unwrapper could not.
     #[error("the surfaces cannot be unwrapped: {0}")]
     Unwrap(String),
+    /// Somebody stopped it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// How texture coordinates were found.

@@ -1,5 +1,7 @@
 //! A triangle cut by a texel: Sutherland and Hodgman ("Reentrant polygon clipping", CACM 17(1), 1974) for four axis-parallel lines.
 
+use std::ops::Range;
+
 /// Corners of the piece of a triangle within the texel whose lowest corner is (`x`, `y`), and their number: none, or three to seven.
 pub fn clip(triangle: [[f64; 2]; 3], x: f64, y: f64) -> ([[f64; 2]; 8], usize) {
     let mut polygon = [[0.0; 2]; 8];
@@ -35,16 +37,21 @@ pub fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Calls `each` with every texel that a triangle, in texels, covers a piece of: its column and row, and the piece's corners.
-pub fn texels_of(triangle: [[f64; 2]; 3], size: [u32; 2], mut each: impl FnMut(u32, u32, &[[f64; 2]])) {
+/// Columns and rows of the texels that a triangle, in texels, may cover a piece of.
+pub fn range(triangle: [[f64; 2]; 3], size: [u32; 2]) -> [Range<u32>; 2] {
     let bound = |axis: usize, pick: fn(f64, f64) -> f64| triangle.map(|p| p[axis]).into_iter().reduce(pick).unwrap_or(0.0);
-    let range = |axis: usize| {
+    [0, 1].map(|axis| {
         let low = bound(axis, f64::min).floor().clamp(0.0, f64::from(size[axis]));
         let high = bound(axis, f64::max).ceil().clamp(0.0, f64::from(size[axis]));
         low as u32..high as u32
-    };
-    for y in range(1) {
-        for x in range(0) {
+    })
+}
+
+/// Calls `each` with every texel of some columns and rows that a triangle, in texels, covers a piece of: its column and
+/// row, and the piece's corners.
+pub fn texels_of(triangle: [[f64; 2]; 3], [columns, rows]: [Range<u32>; 2], mut each: impl FnMut(u32, u32, &[[f64; 2]])) {
+    for y in rows {
+        for x in columns.clone() {
             let (polygon, count) = clip(triangle, f64::from(x), f64::from(y));
             if count > 0 {
                 each(x, y, &polygon[..count]);
@@ -76,7 +83,7 @@ mod tests {
                 t.swap(1, 2);
             }
             let mut area = 0.0;
-            texels_of(t, [16, 16], |x, y, piece| {
+            texels_of(t, range(t, [16, 16]), |x, y, piece| {
                 for k in 1..piece.len() - 1 {
                     let part = cross(piece[0], piece[k], piece[k + 1]);
                     assert!(part > -1e-12);

@@ -4,6 +4,8 @@ use twinray_render::{IrradianceGather, Reconstruction};
 use twinray_scene::{PatchScene, Rgb, Side, SurfaceHit};
 use twinray_solve::Solution;
 
+use crate::texels::PagePoint;
+
 /// Whence the light of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
@@ -57,6 +59,12 @@ impl<'a> SurfaceLight<'a> {
             Source::Smooth(reconstruction) => reconstruction.smooth(patch, &hit).irradiance,
             Source::Gathered(gather, _) => gather.at(patch, &hit, rays, self.seed, key),
         })
+    }
+
+    /// The same at a point of a page, with its share of a texel's rays.
+    pub(crate) fn at_point(&self, point: &PagePoint) -> Option<Rgb> {
+        let rays = (f64::from(self.rays()) * point.share).ceil() as u32;
+        self.at(point.triangle, point.side, point.place, point.key, rays)
     }
 
     /// True if what is met along the normal is the absorbing back of something that the point lies within.

@@ -10,6 +10,7 @@ use crate::page::Page;
 use crate::parts::{self, Part};
 use crate::seams::{SeamJump, Seams};
 use crate::texels;
+use crate::watch::{Stage, Watch};
 
 /// Settings of [`bake`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,17 +43,20 @@ pub struct Lightmap {
 /// The result depends on these values alone, not on threads.
 ///
 /// # Errors
-/// See [`Atlas::new`].
+/// See [`Atlas::new`]; and [`AtlasError::Cancelled`] if `watch` stops it.
 pub fn bake(
     scene: &Scene,
     patches: &PatchScene,
     solution: &Solution,
     options: &LightmapOptions,
+    watch: &mut Watch<'_>,
 ) -> Result<Lightmap, AtlasError> {
+    watch(Stage::Atlas, 0.0)?;
     let parts = parts::parts(scene, patches, solution);
     let atlas = Atlas::new(scene, patches, &parts, &options.atlas)?;
     let light = SurfaceLight::new(patches, solution, options.quality, options.seed);
-    let (mut pages, charted) = texels::fill(&atlas, &parts, &light);
+    let (mut pages, charted) = texels::fill(&atlas, &parts, &|point| light.at_point(point), watch)?;
+    watch(Stage::Seams, 0.0)?;
     for (page, charted) in pages.iter_mut().zip(&charted) {
         dilate(page, charted, options.atlas.padding + 1);
     }

@@ -2,7 +2,7 @@
 
 use twinray_scene::Mesh;
 
-use crate::clip::{cross, texels_of};
+use crate::clip::{cross, range, texels_of};
 use crate::parts::Part;
 
 /// Share of the charts' area that may be covered twice: rims that share a texel's rounding.
@@ -53,7 +53,7 @@ pub fn judge<'a>(parts: impl Iterator<Item = (&'a Part, &'a Mesh)>, area: impl F
             if cross(texels[0], texels[1], texels[2]).abs() < 1e-6 {
                 flat += there;
             }
-            texels_of(texels, [size; 2], |x, y, piece| {
+            texels_of(texels, range(texels, [size; 2]), |x, y, piece| {
                 let area: f64 = (1..piece.len() - 1).map(|k| 0.5 * cross(piece[0], piece[k], piece[k + 1]).abs()).sum();
                 covered[(y * size + x) as usize] += area as f32;
                 on_page += area;

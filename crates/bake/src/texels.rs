@@ -1,136 +1,202 @@
-//! Pages filled: each texel gets the mean irradiance of the piece of surface that it covers.
+//! Pages filled: each texel gets the mean of a value over the piece of surface that it covers.
 //!
 //! Coverage is by area, exactly: a texel that a chart only grazes has the light of what it grazes, and no texel's centre
 //! decides anything.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 use twinray_scene::{Rgb, Side};
 
 use crate::atlas::Atlas;
-use crate::clip::{cross, texels_of};
-use crate::light::SurfaceLight;
+use crate::clip::{cross, range, texels_of};
 use crate::page::Page;
 use crate::parts::Part;
+use crate::watch::{Cancelled, Stage, Watch};
 
-/// Faces that one task does.
-const FACES: usize = 256;
-/// Faces whose pieces are held at once.
-const BATCH: usize = 64 * FACES;
+/// Texels of one task, about, and tasks whose pieces are held at once.
+const TASK: u32 = 1024;
+const BATCH: usize = 512;
+
+/// A point of a page: where it is on the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct PagePoint {
+    /// Triangle of the patches' scene.
+    pub triangle: u32,
+    /// Its side.
+    pub side: Side,
+    /// Barycentric weights of vertices 1 and 2.
+    pub place: [f64; 2],
+    /// Page.
+    pub page: u32,
+    /// On the page, in [0, 1]².
+    pub uv: [f64; 2],
+    /// Names the point among all.
+    pub key: u64,
+    /// What it stands for, as a share of a texel.
+    pub share: f64,
+}
+
+/// Rows of a face.
+struct Task {
+    part: u32,
+    face: u32,
+    corners: [[f64; 2]; 3],
+    columns: Range<u32>,
+    rows: Range<u32>,
+}
 
 /// A piece of a face in a texel.
 struct Piece {
     page: u32,
     texel: u32,
     /// Texels.
-    area: f32,
-    light: Option<Rgb>,
+    area: f64,
+    value: Option<Rgb>,
 }
 
-/// Pages with the light of all parts, and per page which texels charts cover, lit or not.
-pub fn fill(atlas: &Atlas, parts: &[Part], light: &SurfaceLight<'_>) -> (Vec<Page>, Vec<Vec<bool>>) {
+/// Pages with the mean of `value` over what texels cover of all parts, and per page which texels charts cover at all. Points where
+/// `value` knows nothing do not count.
+///
+/// # Errors
+/// If `watch` cancels.
+pub fn fill(
+    atlas: &Atlas,
+    parts: &[Part],
+    value: &(impl Fn(&PagePoint) -> Option<Rgb> + Sync),
+    watch: &mut Watch<'_>,
+) -> Result<(Vec<Page>, Vec<Vec<bool>>), Cancelled> {
     let mut pages: Vec<Page> = atlas.pages.iter().map(|&size| Page::new(size)).collect();
     let mut charted: Vec<Vec<bool>> = pages.iter().map(|p| vec![false; p.coverage.len()]).collect();
-    let mut sums: Vec<Vec<[f64; 3]>> = pages.iter().map(|p| vec![[0.0; 3]; p.coverage.len()]).collect();
-    let faces: Vec<(u32, u32)> = parts
-        .iter()
-        .enumerate()
-        .flat_map(|(p, part)| (0..part.faces.len() as u32).map(move |f| (p as u32, f)))
-        .filter(|&(p, f)| !parts[p as usize].faces[f as usize].dark)
-        .collect();
-    for batch in faces.chunks(BATCH) {
-        let found: Vec<Vec<Piece>> = batch
-            .par_chunks(FACES.min(batch.len().div_ceil(64)))
-            .map(|faces| faces.iter().flat_map(|&(p, f)| pieces(atlas, parts, p as usize, f as usize, light)).collect())
-            .collect();
+    let mut sums: Vec<Vec<[f64; 4]>> = pages.iter().map(|p| vec![[0.0; 4]; p.coverage.len()]).collect();
+    let tasks = tasks(atlas, parts);
+    let mut done = 0;
+    for batch in tasks.chunks(BATCH) {
+        let found: Vec<Vec<Piece>> = batch.par_iter().map(|task| pieces(atlas, parts, task, value)).collect();
         for piece in found.iter().flatten() {
             let (page, texel) = (piece.page as usize, piece.texel as usize);
             charted[page][texel] = true;
-            if let Some(light) = piece.light {
-                let area = f64::from(piece.area);
+            if let Some(value) = piece.value {
+                let [r, g, b] = (value * piece.area).to_array();
                 let sum = &mut sums[page][texel];
-                let light = light.to_array();
-                (0..3).for_each(|c| sum[c] += area * light[c]);
-                pages[page].coverage[texel] += piece.area;
+                *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + piece.area];
             }
         }
+        done += batch.len();
+        watch(Stage::Texels, done as f64 / tasks.len() as f64)?;
     }
     for (page, sums) in pages.iter_mut().zip(&sums) {
-        for ((irradiance, coverage), sum) in page.irradiance.iter_mut().zip(&mut page.coverage).zip(sums) {
-            if *coverage > 0.0 {
-                *irradiance = sum.map(|s| (s / f64::from(*coverage)) as f32);
+        for ((irradiance, coverage), &[r, g, b, area]) in page.irradiance.iter_mut().zip(&mut page.coverage).zip(sums) {
+            if area > 0.0 {
+                *irradiance = [r, g, b].map(|s| (s / area) as f32);
+                *coverage = area.min(1.0) as f32;
             }
-            *coverage = coverage.min(1.0);
         }
     }
     if let Some((page, [low, high])) = atlas.dark {
         let page = &mut pages[page as usize];
-        let texels = |c: f32, size: u32| f64::from(c) * f64::from(size);
-        let range = |axis: usize, size: u32| {
-            texels(low[axis], size).floor() as u32..(texels(high[axis], size).ceil() as u32).min(size)
+        let span = |axis: usize, size: u32| {
+            let texels = |c: f32| f64::from(c) * f64::from(size);
+            texels(low[axis]).floor() as u32..(texels(high[axis]).ceil() as u32).min(size)
         };
-        for y in range(1, page.height) {
-            for x in range(0, page.width) {
+        for y in span(1, page.height) {
+            for x in span(0, page.width) {
                 page.coverage[(y * page.width + x) as usize] = 1.0;
             }
         }
     }
-    (pages, charted)
+    Ok((pages, charted))
 }
 
-fn pieces(atlas: &Atlas, parts: &[Part], part: usize, face: usize, light: &SurfaceLight<'_>) -> Vec<Piece> {
-    let laid = &atlas.parts[part];
-    let page = laid.pages[face];
+fn tasks(atlas: &Atlas, parts: &[Part]) -> Vec<Task> {
+    let mut found = Vec::new();
+    for (p, (part, laid)) in parts.iter().zip(&atlas.parts).enumerate() {
+        for (f, face) in part.faces.iter().enumerate() {
+            if face.dark {
+                continue;
+            }
+            let size = atlas.pages[laid.pages[f] as usize];
+            let corners = laid.triangles[f].map(|k| {
+                let [u, v] = laid.vertices[k as usize].uv.map(f64::from);
+                [u * f64::from(size[0]), v * f64::from(size[1])]
+            });
+            let [columns, rows] = range(corners, size);
+            let step = (TASK / (columns.len() as u32).max(1)).max(1) as usize;
+            for start in rows.clone().step_by(step) {
+                let rows = start..rows.end.min(start + step as u32);
+                found.push(Task { part: p as u32, face: f as u32, corners, columns: columns.clone(), rows });
+            }
+        }
+    }
+    found
+}
+
+fn pieces(
+    atlas: &Atlas,
+    parts: &[Part],
+    task: &Task,
+    value: &(impl Fn(&PagePoint) -> Option<Rgb> + Sync),
+) -> Vec<Piece> {
+    let (part, corners) = (&parts[task.part as usize], task.corners);
+    let page = atlas.parts[task.part as usize].pages[task.face as usize];
     let size = atlas.pages[page as usize];
-    let corners = laid.triangles[face].map(|k| {
-        let [u, v] = laid.vertices[k as usize].uv.map(f64::from);
-        [u * f64::from(size[0]), v * f64::from(size[1])]
-    });
     let mut found = Vec::new();
     let whole = cross(corners[0], corners[1], corners[2]);
     if whole == 0.0 {
         return found;
     }
-    let part = &parts[part];
-    let (triangle, side) = (part.faces[face].triangle, part.side);
-    texels_of(corners, size, |x, y, piece| {
-        let texel = y * size[0] + x;
-        let (mut sum, mut lit, mut area) = (Rgb::BLACK, 0.0, 0.0);
+    let (triangle, side) = (part.faces[task.face as usize].triangle, part.side);
+    texels_of(corners, [task.columns.clone(), task.rows.clone()], |x, y, piece| {
+        let (mut sum, mut known) = (Rgb::BLACK, 0.0);
         for k in 1..piece.len() - 1 {
             let fan = [piece[0], piece[k], piece[k + 1]];
-            let share = (0.5 * cross(fan[0], fan[1], fan[2])).abs();
-            area += share;
-            for (point, weight) in points(fan, share) {
+            let area = (0.5 * cross(fan[0], fan[1], fan[2])).abs();
+            let points = points(fan, area);
+            for &point in points.iter() {
                 let weights = [
                     cross(point, corners[1], corners[2]) / whole,
                     cross(corners[0], point, corners[2]) / whole,
                     cross(corners[0], corners[1], point) / whole,
                 ];
+                let share = area / points.len() as f64;
                 // The place on the page names the point, whatever else there is.
-                let key = (u64::from(page) << 1 | u64::from(side == Side::Back)) ^ point[0].to_bits().rotate_left(19) ^ point[1].to_bits();
-                let rays = (f64::from(light.rays()) * share * weight).ceil() as u32;
-                let weight = weight * share;
-                if let Some(there) = light.at(triangle, side, part.place(weights), key, rays) {
-                    sum += there * weight;
-                    lit += weight;
+                let key = u64::from(page) ^ point[0].to_bits().rotate_left(19) ^ point[1].to_bits();
+                let uv = [point[0] / f64::from(size[0]), point[1] / f64::from(size[1])];
+                let point = PagePoint { triangle, side, place: part.place(weights), page, uv, key, share };
+                if let Some(there) = value(&point) {
+                    sum += there * share;
+                    known += share;
                 }
             }
         }
-        let light = (lit > 0.0).then(|| sum / lit);
-        found.push(Piece { page, texel, area: if light.is_some() { lit as f32 } else { area as f32 }, light });
+        let value = (known > 0.0).then(|| sum / known);
+        found.push(Piece { page, texel: y * size[0] + x, area: known, value });
     });
     found
 }
 
-/// Points that stand for a triangle of `area` texels, and their shares: the middles of its four parts, or its own.
-fn points([a, b, c]: [[f64; 2]; 3], area: f64) -> impl Iterator<Item = ([f64; 2], f64)> {
+/// Points that stand for a triangle of `area` texels: the middles of its four parts, or its own.
+fn points([a, b, c]: [[f64; 2]; 3], area: f64) -> Points {
     let at = move |wa: f64, wb: f64, wc: f64| [0, 1].map(|k| wa * a[k] + wb * b[k] + wc * c[k]);
     let third = 1.0 / 3.0;
-    let all = [
-        at(third, third, third),
-        at(2.0 * third, 0.5 * third, 0.5 * third),
-        at(0.5 * third, 2.0 * third, 0.5 * third),
-        at(0.5 * third, 0.5 * third, 2.0 * third),
-    ];
-    let count = if area > 0.1 { 4 } else { 1 };
-    all.into_iter().take(count).map(move |p| (p, 1.0 / count as f64))
+    let middle = at(third, third, third);
+    if area <= SMALL {
+        return Points([middle; 4], 1);
+    }
+    let corner = 2.0 * third;
+    let other = 0.5 * third;
+    Points([middle, at(corner, other, other), at(other, corner, other), at(other, other, corner)], 4)
+}
+
+/// Texels below which one point is enough.
+const SMALL: f64 = 0.1;
+
+struct Points([[f64; 2]; 4], usize);
+
+impl std::ops::Deref for Points {
+    type Target = [[f64; 2]];
+
+    fn deref(&self) -> &Self::Target {
+        &self.0[..self.1]
+    }
 }
