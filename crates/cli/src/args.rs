@@ -37,6 +37,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Write the light of every patch as a table or a mesh for other programs, or a walk-through as one HTML file
     Export(ExportArgs),
+    /// Bake the light of a scene into it: glTF with lightmaps, light at vertices, or probes for what moves
+    Bake(Box<BakeArgs>),
     /// Walk through a scene in a browser while it is solved, or through the light of a .twin file
     View(Box<ViewerArgs>),
     /// Say how far a picture or a solution is from a reference
@@ -410,6 +412,96 @@ impl UnitName {
             UnitName::Watt => "W/m²",
         }
     }
+}
+
+/// `twinray bake`.
+#[derive(Debug, clap::Args)]
+pub struct BakeArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Solver.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// File to write: .glb [default: SCENE-lit.glb in this folder]. Lightmaps that lie beside it take its name
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// What carries the light [default: lightmap]
+    #[arg(long, value_enum)]
+    pub to: Option<CarrierArg>,
+    /// Who is to load it [default: three]
+    #[arg(long = "for", value_name = "ENGINE", value_enum)]
+    pub engine: Option<EngineArg>,
+    /// Texels for a metre, on as many pages as it takes [default: as many as one page holds]
+    #[arg(long, value_name = "TEXELS_PER_METRE", value_parser = density, allow_negative_numbers = true)]
+    pub density: Option<f64>,
+    /// Side of a page, texels, at most [default: 1024, or 2048 with --density]
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(64..=8192))]
+    pub page_size: Option<u32>,
+    /// Texels around each chart that belong to no other: 2 for bilinear filters, more for mip maps
+    #[arg(long, value_name = "TEXELS", default_value = "2", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub padding: u32,
+    /// How each texel's light is found [default: smooth]
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityArg>,
+    /// Of --quality high: rays that each texel gathers with
+    #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub texel_rays: u32,
+    /// Lay out new texture coordinates even where the scene's second set is sound
+    #[arg(long)]
+    pub unwrap: bool,
+    /// Leave jumps where charts of a smooth surface meet
+    #[arg(long)]
+    pub no_stitch: bool,
+    /// Keep the lights that were baked in; without, point, spot and directional lights are taken out of the file
+    #[arg(long)]
+    pub keep_lights: bool,
+    /// Of --for unlit: stops by which pictures are brighter [default: by the light that there is]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    pub exposure: Option<f64>,
+}
+
+/// What carries baked light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum CarrierArg {
+    /// Textures of irradiance.
+    #[default]
+    Lightmap,
+    /// Values at vertices.
+    Vertex,
+    /// A grid of irradiance for all directions, for what moves.
+    Probes,
+}
+
+/// Who loads it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum EngineArg {
+    /// three.js with the loader plugin of docs/bake.md: irradiance, within the file.
+    #[default]
+    Three,
+    /// Bevy: irradiance / π in KTX2 files beside the .glb.
+    Bevy,
+    /// Godot and other engines: irradiance in EXR files beside the .glb.
+    Godot,
+    /// Any viewer of glTF: colours as they look, without lights.
+    Unlit,
+}
+
+/// How the light of a texel is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum QualityArg {
+    /// Means of the cells that it covers, as they are.
+    Cells,
+    /// Smooth between cells of a surface that see each other.
+    #[default]
+    Smooth,
+    /// Gathered anew at each texel: sharp shadows, and slower.
+    High,
+}
+
+fn density(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of texels per metre, such as 20".to_owned())?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("expected a positive number of texels per metre".into()) }
 }
 
 /// `twinray view`.

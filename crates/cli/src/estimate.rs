@@ -48,6 +48,8 @@ pub struct Work {
     pub picture: Option<PictureWork>,
     /// Whether a solution file is written.
     pub writes_solution: bool,
+    /// Whether the scene is needed beside its patches.
+    pub keeps_scene: bool,
     /// Whether another process speaks for this one, or the command itself says what there is.
     pub is_silent: bool,
 }

@@ -38,6 +38,8 @@ pub struct Loaded {
     pub expected: Expected,
     /// The solution file that stands for the scene, if it is one.
     pub stored: Option<Stored>,
+    /// The scene itself, its cameras and their movements taken out, where the work asks for it.
+    pub scene: Option<Scene>,
     /// Where the scene is, as seen from the working folder, and how it was cut.
     source: SceneSource,
     /// How it was lit beside what its file says.
@@ -91,7 +93,7 @@ pub fn read(name: &str, args: &ReadArgs) -> anyhow::Result<(Scene, Vec<String>)>
 }
 
 /// What files may ask for.
-fn limits(args: &ReadArgs) -> Limits {
+pub fn limits(args: &ReadArgs) -> Limits {
     let limits = Limits { allow_outside: args.allow_outside, ..Limits::default() };
     args.max_memory.map_or(limits.clone(), |bytes| limits.within(bytes))
 }
@@ -208,12 +210,12 @@ fn cut(
         warnings
             .push(format!("{name}: {count} triangles left out, as they have no area or no finite place in the scene"));
     }
-    let mut cameras = scene.cameras;
+    let mut cameras = std::mem::take(&mut scene.cameras);
     let is_chosen = wanted.is_some();
     cameras.splice(0..0, wanted);
-    let animations = scene.animations;
+    let animations = std::mem::take(&mut scene.animations);
     Ok(Loaded {
-        name: scene.name,
+        name: scene.name.clone(),
         patches,
         cameras,
         is_chosen,
@@ -221,6 +223,7 @@ fn cut(
         warnings,
         expected,
         stored: None,
+        scene: work.keeps_scene.then_some(scene),
         source,
         light,
     })

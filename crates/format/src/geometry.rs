@@ -17,8 +17,8 @@ const ZERO_AREA: f64 = 1e-10;
 
 /// Takes out of `mesh` what light cannot use, each kind with one warning:
 /// triangles with damaged vertices, without area, and exact copies (same corners in the same order of rotation)
-/// of an earlier one, which would shadow each other.
-pub(crate) fn clean(context: &mut Context<'_>, mesh: &mut Mesh) {
+/// of an earlier one, which would shadow each other. Answers which of the vertices are left, if not all are.
+pub(crate) fn clean(context: &mut Context<'_>, mesh: &mut Mesh) -> Option<Vec<bool>> {
     let limit = context.limits.max_coordinate;
     let good: Vec<bool> = mesh.positions.iter().map(|p| p.iter().all(|c| f64::from(c.abs()) <= limit)).collect();
     let before = mesh.triangles.len();
@@ -41,10 +41,9 @@ pub(crate) fn clean(context: &mut Context<'_>, mesh: &mut Mesh) {
     report(damaged, &format!("a corner is not a number or beyond {limit:e}"));
     report(empty, "no area");
     report(doubled, "exact copies of others");
-    if mesh.triangles.len() < before {
-        drop_unused_vertices(mesh);
-    }
+    let left = (mesh.triangles.len() < before).then(|| drop_unused_vertices(mesh));
     mend_attributes(context, mesh, &element);
+    left
 }
 
 /// Removes all but the first of triangles with equal corners and orientation; answers how many.
@@ -78,8 +77,8 @@ fn remove_copies(mesh: &mut Mesh) -> usize {
     before - mesh.triangles.len()
 }
 
-/// Renumbers the vertices so that every one belongs to a triangle.
-fn drop_unused_vertices(mesh: &mut Mesh) {
+/// Renumbers the vertices so that every one belongs to a triangle; answers which do.
+fn drop_unused_vertices(mesh: &mut Mesh) -> Vec<bool> {
     let mut used = vec![false; mesh.positions.len()];
     mesh.triangles.iter().flatten().for_each(|&i| used[i as usize] = true);
     let before = |count: &mut u32, &used: &bool| {
@@ -97,6 +96,7 @@ fn drop_unused_vertices(mesh: &mut Mesh) {
     mesh.normals.iter_mut().for_each(|n| keep(n, &used));
     mesh.tangents.iter_mut().for_each(|t| keep(t, &used));
     mesh.texcoords.iter_mut().chain(&mut mesh.second_texcoords).for_each(|t| keep(t, &used));
+    used
 }
 
 /// Replaces normals without direction by the geometric ones around the vertex, and damaged texture coordinates

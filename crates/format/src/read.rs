@@ -3,6 +3,7 @@
 //! Not here: anything a format says. Called by: the command, the viewer, tests.
 
 use std::io;
+use std::sync::Arc;
 
 use twinray_scene::Scene;
 
@@ -20,8 +21,24 @@ pub type Resolver<'a> = dyn FnMut(&str) -> io::Result<Vec<u8>> + 'a;
 pub struct Reading {
     /// The scene.
     pub scene: Scene,
+    /// For each of its instances where it is in the glTF document: what [`crate::write_lit_glb`] needs. `None` where there is
+    /// nothing as it was read.
+    pub origins: Vec<Option<Origin>>,
     /// What was changed, ignored or guessed, in order of appearance.
     pub warnings: Vec<Warning>,
+}
+
+/// Where an instance comes from in a glTF document.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Origin {
+    /// Index of the node.
+    pub node: usize,
+    /// Index of its mesh.
+    pub mesh: usize,
+    /// Index of the primitive in the mesh.
+    pub primitive: usize,
+    /// For each vertex of our mesh, the element of the primitive's accessors that it was.
+    pub vertices: Arc<[u32]>,
 }
 
 /// Reads a scene from the bytes of a `.glb`, `.gltf` or `.obj` file.
@@ -58,10 +75,14 @@ pub fn read_scene(
     context.charge(0, "file")?;
     let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
     let (stem, extension) = base.rsplit_once('.').unwrap_or((base, ""));
-    let mut scene = match extension.to_ascii_lowercase().as_str() {
+    let obj = |scene: Scene| {
+        let origins = vec![None; scene.instances.len()];
+        (scene, origins)
+    };
+    let (mut scene, origins) = match extension.to_ascii_lowercase().as_str() {
         _ if bytes.starts_with(b"glTF") => crate::gltf::read(&mut context, bytes)?,
         "gltf" | "glb" => crate::gltf::read(&mut context, bytes)?,
-        "obj" => crate::obj::read(&mut context, bytes)?,
+        "obj" => obj(crate::obj::read(&mut context, bytes)?),
         _ if bytes.trim_ascii_start().starts_with(b"{") => crate::gltf::read(&mut context, bytes)?,
         other => {
             let what = if other.is_empty() { "a file without an extension".into() } else { format!("format .{other}") };
@@ -70,5 +91,5 @@ pub fn read_scene(
         }
     };
     scene.name = stem.to_owned();
-    Ok(Reading { scene, warnings: context.warnings.finish(name) })
+    Ok(Reading { scene, origins, warnings: context.warnings.finish(name) })
 }

@@ -1,5 +1,6 @@
 //! One file a verb.
 
+pub mod bake;
 pub mod compare;
 mod compare_pictures;
 mod compare_solutions;

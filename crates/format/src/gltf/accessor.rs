@@ -20,7 +20,7 @@ pub(super) enum Component {
 }
 
 impl Component {
-    fn from_code(code: u64) -> Option<Self> {
+    pub(super) fn from_code(code: u64) -> Option<Self> {
         Some(match code {
             5120 => Self::I8,
             5121 => Self::U8,
@@ -32,7 +32,7 @@ impl Component {
         })
     }
 
-    fn bytes(self) -> usize {
+    pub(super) fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -41,7 +41,7 @@ impl Component {
     }
 
     /// The value stored in the first bytes of `bytes`.
-    fn read(self, bytes: &[u8]) -> f64 {
+    pub(super) fn read(self, bytes: &[u8]) -> f64 {
         match (self, bytes) {
             (Self::I8, [a, ..]) => f64::from(*a as i8),
             (Self::U8, [a, ..]) => f64::from(*a),
@@ -154,7 +154,8 @@ impl<'v> Accessor<'v> {
         self.component.read_index(self.element(i))
     }
 
-    fn element(&self, i: usize) -> &'v [u8] {
+    /// The bytes of element `i`, and more after them; none where every element is 0.
+    pub(super) fn element(&self, i: usize) -> &'v [u8] {
         if let Some(bytes) = self.sparse.as_ref().and_then(|s| s.find(i, self.size)) {
             return bytes;
         }
@@ -245,7 +246,7 @@ fn extent<'v>(
     Ok((bytes, stride))
 }
 
-fn components_of(kind: &str) -> usize {
+pub(super) fn components_of(kind: &str) -> usize {
     match kind {
         "VEC2" => 2,
         "VEC3" => 3,

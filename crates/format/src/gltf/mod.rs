@@ -1,13 +1,14 @@
 //! glTF 2.0, binary and text: from a document to a scene, in the order a reader of the code expects.
 //!
 //! `container` opens the file, `json` finds its way in it, `node` walks the tree, `primitive` and `material`
-//! and `light` read what stands there, `animation` how cameras move, `write` goes the other way. Called by `read_scene`.
+//! and `light` read what stands there, `animation` how cameras move, `write` goes the other way, `lit` puts baked light into a document. Called by `read_scene`.
 
 mod accessor;
 mod animation;
 mod container;
 mod json;
 mod light;
+mod lit;
 mod material;
 mod node;
 mod primitive;
@@ -15,6 +16,7 @@ mod slot;
 mod write;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use glam::DAffine3;
 use twinray_scene::{Environment, Instance, Mesh, Rgb, Scene};
@@ -28,7 +30,9 @@ use self::primitive::Primitives;
 use crate::context::Context;
 use crate::error::FormatError;
 use crate::geometry::{Account, RICHEST_VERTEX, clean, mesh_bytes, no_triangles};
+use crate::read::Origin;
 
+pub use self::lit::{Lit, LitMaterial, LitPage, LitPicture, LitSurface, LitVertex, write_lit_glb};
 pub use self::write::write_glb;
 
 /// Extensions that are read, or whose absence from the result is named where it shows.
@@ -49,8 +53,11 @@ const UNDERSTOOD: [&str; 11] = [
 /// Memory of a mesh beside its arrays and its name.
 const MESH_BYTES: u64 = 2 * size_of::<Mesh>() as u64;
 
-/// Reads a `.glb` or `.gltf` file.
-pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, FormatError> {
+/// Reads a `.glb` or `.gltf` file; says for each instance where it is in it.
+pub(crate) fn read(
+    context: &mut Context<'_>,
+    bytes: &[u8],
+) -> Result<(Scene, Vec<Option<Origin>>), FormatError> {
     let (text, chunk) = container::split(context.file, bytes)?;
     let (document, tree_bytes) = json::parse(context, text)?;
     let root = Element::root(context.file, &document);
@@ -70,6 +77,8 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
         lights: Lights::default(),
         account: Account::default(),
         camera_places: Vec::new(),
+        primitives_of_meshes: Vec::new(),
+        origins: Vec::new(),
         scene: Scene::default(),
     };
     for (i, place) in placed.iter().enumerate() {
@@ -81,7 +90,7 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
     warn_ignored(context, &placed);
     read_extras(context, &root, &mut content.scene);
 
-    let Content { materials, mut scene, .. } = content;
+    let Content { materials, mut scene, origins, .. } = content;
     let (list, pictures) = materials.finish(context);
     scene.materials = list;
     scene.images = pictures.into_images();
@@ -89,7 +98,7 @@ pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<Scene, For
     if scene.instances.is_empty() {
         return Err(no_triangles(context, "scene"));
     }
-    Ok(scene)
+    Ok((scene, origins))
 }
 
 /// The scene as it grows.
@@ -101,6 +110,11 @@ struct Content<'v, 'b> {
     meshes: HashMap<usize, Vec<usize>>,
     lights: Lights,
     account: Account,
+    /// Of each of our meshes: the number of its primitive, and which elements of its accessors its vertices are. `None` for copies that
+    /// were changed.
+    primitives_of_meshes: Vec<Option<(usize, Arc<[u32]>)>>,
+    /// One for each instance.
+    origins: Vec<Option<Origin>>,
     /// Where each camera of the scene is among the placed nodes.
     camera_places: Vec<usize>,
     scene: Scene,
@@ -129,6 +143,12 @@ impl Content<'_, '_> {
             context.charge(256 + name.len() as u64, &place.node.path)?;
             context.charge(256 + name.len() as u64, &place.node.path)?;
             self.account.add(context, &place.node.path, self.scene.meshes[mesh].triangles.len())?;
+            self.origins.push(self.primitives_of_meshes[mesh].as_ref().map(|(primitive, vertices)| Origin {
+                node: place.index,
+                mesh: index,
+                primitive: *primitive,
+                vertices: vertices.clone(),
+            }));
             self.scene.instances.push(Instance { name: name.clone(), mesh, transform });
         }
         Ok(())
@@ -147,7 +167,10 @@ impl Content<'_, '_> {
         for (i, primitive) in mesh.items("primitives")?.enumerate() {
             let name = if count > 1 { format!("{base}#{i}") } else { base.clone() };
             context.charge(MESH_BYTES + name.len() as u64, &primitive.path)?;
-            let Some(read) = self.primitives.read(context, root, &primitive, &name)? else { continue };
+            let Some((read, vertices)) = self.primitives.read(context, root, &primitive, &name)? else { continue };
+            // Beside the arrays of the mesh, which are at least three times as large.
+            context.charge(vertices.len() as u64 * 4, &primitive.path)?;
+            self.primitives_of_meshes.push(Some((i, vertices.into())));
             let material = self.materials.of(context, root, self.buffers, &primitive)?;
             self.scene.meshes.push(Mesh { material, ..read });
             meshes.push(self.scene.meshes.len() - 1);
@@ -181,6 +204,7 @@ impl Content<'_, '_> {
             return Ok(None);
         }
         self.scene.meshes.push(flat);
+        self.primitives_of_meshes.push(None);
         Ok(Some((self.scene.meshes.len() - 1, DAffine3::from_translation(to_world.translation))))
     }
 }

@@ -28,14 +28,15 @@ impl<'v, 'b> Primitives<'v, 'b> {
         Self { buffers, renumbered: Vec::new(), quantized }
     }
 
-    /// The mesh of `primitive`, without its material; `None` if it has no triangles.
+    /// The mesh of `primitive`, without its material, and which element of the accessors each vertex was; `None` if it has no
+    /// triangles.
     pub(super) fn read(
         &mut self,
         context: &mut Context<'_>,
         root: &Element<'_>,
         primitive: &Element<'_>,
         name: &str,
-    ) -> Result<Option<Mesh>, FormatError> {
+    ) -> Result<Option<(Mesh, Vec<u32>)>, FormatError> {
         let mode = primitive.integer("mode")?.unwrap_or(4);
         match mode {
             4..=6 => {}
@@ -123,9 +124,12 @@ impl<'v, 'b> Primitives<'v, 'b> {
         mesh.tangents = tangents.map(|t| used.iter().map(|&i| t.floats(i as usize)).collect());
         mesh.texcoords = texcoords.map(|t| used.iter().map(|&i| t.floats(i as usize)).collect());
         mesh.second_texcoords = second.map(|t| used.iter().map(|&i| t.floats(i as usize)).collect());
-        clean(context, &mut mesh);
+        if let Some(left) = clean(context, &mut mesh) {
+            let mut left = left.iter();
+            used.retain(|_| left.next().copied().unwrap_or(false));
+        }
         context.budget.release(triangles as u64 * 16);
-        Ok(Some(mesh).filter(|m| !m.triangles.is_empty()))
+        Ok(Some((mesh, used)).filter(|(m, _)| !m.triangles.is_empty()))
     }
 
     fn renumber(&mut self, index: u32, used: &mut Vec<u32>) -> u32 {

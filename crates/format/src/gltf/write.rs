@@ -101,7 +101,7 @@ pub fn write_glb(scene: &Scene) -> Vec<u8> {
 }
 
 /// The two chunks, padded to four bytes as the format wants: JSON with spaces, data with zeros.
-fn container(mut text: Vec<u8>, binary: Vec<u8>) -> Vec<u8> {
+pub(super) fn container(mut text: Vec<u8>, binary: Vec<u8>) -> Vec<u8> {
     text.resize(text.len().next_multiple_of(4), b' ');
     let binary_chunk = if binary.is_empty() { 0 } else { 8 + binary.len() };
     let length = 12 + 8 + text.len() + binary_chunk;

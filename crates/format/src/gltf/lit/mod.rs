@@ -1,0 +1,244 @@
+//! Baked light put into the document that it was baked for. Everything else of the document stays as it is: nodes,
+//! names, animations, materials, extensions that nobody here knows.
+//!
+//! `geometry` makes primitives with new texture coordinates, `materials` those that show the light, `tidy` puts all binary data into one
+//! chunk and leaves out what nothing refers to any more.
+
+mod geometry;
+mod materials;
+mod tidy;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Value, json};
+
+use self::geometry::Geometry;
+use self::materials::Materials;
+use super::container::{self, Buffers};
+use super::json::{self, Element};
+use crate::context::Context;
+use crate::error::FormatError;
+use crate::limits::Limits;
+use crate::read::{Origin, Resolver};
+
+/// Baked light for a document.
+#[derive(Clone, Debug, Default)]
+pub struct Lit {
+    /// What is drawn with it.
+    pub surfaces: Vec<LitSurface>,
+    /// What the materials of surfaces become.
+    pub pages: Vec<LitPage>,
+    /// Take point, spot and directional lights out: their light is baked.
+    pub drop_lights: bool,
+    /// Goes to `asset.extras.twinray_bake`.
+    pub about: Value,
+}
+
+/// Triangles of one primitive of one node.
+#[derive(Clone, Debug, Default)]
+pub struct LitSurface {
+    /// Instance of the scene that was read.
+    pub instance: usize,
+    /// Vertices.
+    pub vertices: Vec<LitVertex>,
+    /// Triangles as they are drawn.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Lit::pages`].
+    pub page: Option<usize>,
+    /// It is the back: normals are turned round.
+    pub back: bool,
+    /// Only one side is drawn: the other has triangles of its own.
+    pub one_sided: bool,
+}
+
+/// A vertex of the scene's mesh with what the bake knows of it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LitVertex {
+    /// Vertex of the mesh.
+    pub source: u32,
+    /// `TEXCOORD_1`.
+    pub texcoord: Option<[f32; 2]>,
+    /// Irradiance, W·m⁻² (or lux): `_IRRADIANCE`, and `COLOR_0` within [0, 1].
+    pub irradiance: Option<[f32; 3]>,
+}
+
+/// A picture within the file.
+#[derive(Clone, Debug)]
+pub struct LitPicture {
+    /// Its name.
+    pub name: String,
+    /// The file's bytes.
+    pub bytes: Vec<u8>,
+    /// Such as `image/png`.
+    pub mime: &'static str,
+}
+
+/// A page of an atlas as materials show it.
+#[derive(Clone, Debug)]
+pub struct LitPage {
+    /// For messages and names.
+    pub name: String,
+    /// How.
+    pub material: LitMaterial,
+}
+
+/// What a page makes of a material.
+#[derive(Clone, Debug)]
+pub enum LitMaterial {
+    /// Adds a lightmap of irradiance: `TWINRAY_lightmap`, and `MOZ_lightmap` with a picture of 8 bits for those that know it.
+    Lightmap {
+        /// Irradiance, W·m⁻² (or lux).
+        hdr: LitPicture,
+        /// Irradiance over `intensity`, sRGB-encoded.
+        ldr: LitPicture,
+        /// What is white in `ldr`.
+        intensity: f32,
+    },
+    /// Says in the material's extras, `twinray_lightmap`, which file beside this one has its light.
+    Beside(Value),
+    /// Replaces it by colours as they look, without lights: `KHR_materials_unlit`.
+    Unlit(LitPicture),
+}
+
+/// Writes a document with baked light as one `.glb` file. `name`, `source`, `resolver` and `limits` are those of
+/// [`crate::read_scene`], which gave `origins`.
+///
+/// A primitive that has surfaces is replaced by them: attributes of any kind, morph targets among them, are copied vertex by
+/// vertex; `TEXCOORD_1` becomes the lightmap's, and where the material uses the old one, that is kept under the next free number.
+/// Nodes that shared a mesh get meshes of their own. Equal arguments give equal bytes.
+///
+/// # Errors
+/// As [`crate::read_scene`]. A surface whose instance has no origin is left out.
+pub fn write_lit_glb(
+    name: &str,
+    source: &[u8],
+    resolver: &mut Resolver<'_>,
+    limits: &Limits,
+    origins: &[Option<Origin>],
+    lit: &Lit,
+) -> Result<Vec<u8>, FormatError> {
+    let mut fetch = |path: &str| resolver(path);
+    let mut context = Context::new(name, limits, &mut fetch);
+    let (text, chunk) = container::split(name, source)?;
+    let (original, _) = json::parse(&mut context, text)?;
+    let root = Element::root(name, &original);
+    let buffers = Buffers::load(&mut context, &root, chunk)?;
+
+    let mut document = original.clone();
+    let mut geometry = Geometry::new(&root, &buffers);
+    let mut materials = Materials::new(&original, lit);
+    let mut extensions = BTreeSet::new();
+    // Nodes in order, of each the primitives that have surfaces.
+    let mut nodes: BTreeMap<usize, BTreeMap<usize, Vec<(&LitSurface, &Origin)>>> = BTreeMap::new();
+    for surface in lit.surfaces.iter().filter(|s| !s.triangles.is_empty()) {
+        if let Some(origin) = origins.get(surface.instance).and_then(Option::as_ref) {
+            nodes.entry(origin.node).or_default().entry(origin.primitive).or_default().push((surface, origin));
+        }
+    }
+    let mut meshes = Meshes::new(&original, nodes.keys().copied());
+    for (node, primitives) in &nodes {
+        let Some((_, first)) = primitives.values().flatten().next() else { continue };
+        let Some(mesh) = original["meshes"].get(first.mesh) else { continue };
+        let mut lit_mesh = mesh.clone();
+        let mut list = Vec::new();
+        for (k, primitive) in mesh["primitives"].as_array().into_iter().flatten().enumerate() {
+            let Some(surfaces) = primitives.get(&k) else {
+                list.push(primitive.clone());
+                continue;
+            };
+            let element = root.item("meshes", first.mesh).and_then(|m| m.item("primitives", k));
+            let Some(element) = element else { continue };
+            for (surface, origin) in surfaces {
+                let material = primitive["material"].as_u64().map(|m| m as usize);
+                let moved = materials.uses_second_set(material);
+                let mut made = geometry.primitive(primitive, &element, surface, &origin.vertices, moved)?;
+                let second = made.moved_to;
+                if let Some(index) = materials.of(material, surface, second) {
+                    made.value["material"] = json!(index);
+                }
+                list.push(made.value);
+            }
+        }
+        lit_mesh["primitives"] = Value::Array(list);
+        if let Some(scale) = geometry.take_scale() {
+            lit_mesh["extras"]["twinray_irradiance_scale"] = json!(scale);
+        }
+        document["nodes"][*node]["mesh"] = json!(meshes.put(first.mesh, lit_mesh));
+    }
+    if !meshes.list.is_empty() {
+        document["meshes"] = Value::Array(meshes.list);
+    }
+    materials.finish(&mut document, &mut geometry, &mut extensions);
+    if lit.drop_lights {
+        drop_lights(&mut document);
+    }
+    if !lit.about.is_null() {
+        document["asset"]["extras"]["twinray_bake"] = lit.about.clone();
+    }
+    list_extensions(&mut document, &extensions);
+    tidy::finish(&mut context, &root, &buffers, document, geometry)
+}
+
+/// Meshes of the document: those of lit nodes take the place of the original where every node that shows it is lit.
+struct Meshes {
+    list: Vec<Value>,
+    free: Vec<bool>,
+}
+
+impl Meshes {
+    fn new(original: &Value, lit: impl Iterator<Item = usize>) -> Self {
+        let list: Vec<Value> = original["meshes"].as_array().cloned().unwrap_or_default();
+        let lit: BTreeSet<usize> = lit.collect();
+        let mut free = vec![true; list.len()];
+        for (k, node) in original["nodes"].as_array().into_iter().flatten().enumerate() {
+            if let Some(mesh) = node["mesh"].as_u64().filter(|_| !lit.contains(&k)) {
+                free[mesh as usize] = false;
+            }
+        }
+        Self { list, free }
+    }
+
+    fn put(&mut self, original: usize, mesh: Value) -> usize {
+        if std::mem::take(&mut self.free[original]) {
+            self.list[original] = mesh;
+            return original;
+        }
+        self.list.push(mesh);
+        self.list.len() - 1
+    }
+}
+
+/// Nodes keep their places; lights leave.
+fn drop_lights(document: &mut Value) {
+    const LIGHTS: [&str; 2] = ["KHR_lights_punctual", "EXT_lights_ies"];
+    let remove = |owner: &mut Value| {
+        let Some(extensions) = owner.get_mut("extensions").and_then(Value::as_object_mut) else { return };
+        LIGHTS.iter().for_each(|l| drop(extensions.remove(*l)));
+        if extensions.is_empty()
+            && let Some(owner) = owner.as_object_mut()
+        {
+            owner.remove("extensions");
+        }
+    };
+    document["nodes"].as_array_mut().into_iter().flatten().for_each(remove);
+    remove(document);
+    for key in ["extensionsUsed", "extensionsRequired"] {
+        if let Some(list) = document.get_mut(key).and_then(Value::as_array_mut) {
+            list.retain(|e| !LIGHTS.iter().any(|l| e == l));
+        }
+        if document.get(key).and_then(Value::as_array).is_some_and(Vec::is_empty)
+            && let Some(document) = document.as_object_mut()
+        {
+            document.remove(key);
+        }
+    }
+}
+
+fn list_extensions(document: &mut Value, added: &BTreeSet<&'static str>) {
+    if added.is_empty() {
+        return;
+    }
+    let mut list = document["extensionsUsed"].as_array().cloned().unwrap_or_default();
+    list.extend(added.iter().filter(|e| !list.iter().any(|l| l == *e)).map(|e| json!(e)).collect::<Vec<_>>());
+    document["extensionsUsed"] = Value::Array(list);
+}
