@@ -13,6 +13,7 @@ import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 
 import { browser as start, wait } from "./browser.js";
+import { panesFile, throughPanes, wall } from "./panes.js";
 
 /** @import { Browser, Page } from "puppeteer-core" */
 /** @import { ChildProcess } from "node:child_process" */
@@ -374,6 +375,45 @@ test("a glossy hall is as bright as `render` has it, and false colours fit a sma
     await rested(page);
     await page.screenshot({ path: join(PICTURES, "false-colour.png") });
     assert.ok(await page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is too wide");
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
+
+test("panes behind panes are as bright and as coloured from either side as by hand", { skip }, async () => {
+    writeFileSync(join(folder, "panes.gltf"), panesFile());
+    run("solve", "panes.gltf", "--patches", "2k", "--rays", "20k", "-o", "panes.twin");
+    run("export", "panes.twin", "-o", "panes.html");
+    const { page, complaints } = await open(pathToFileURL(join(folder, "panes.html")).href);
+    for (const camera of ["front", "back"]) {
+        await page.evaluate((name) => {
+            const { camera, walk } = /** @type {any} */ (globalThis).twinray;
+            camera.set(walk.cameras.find((/** @type {any} */ c) => c.name === name));
+        }, camera);
+        const { size, base64 } = await picture(page, { exposure: 0, curve: "none" }, `panes-${camera}`);
+        const [middle, beside] = /** @type {number[][]} */ (
+            await page.evaluate(async () => {
+                const { renderer } = /** @type {any} */ (globalThis).twinray;
+                const { clientWidth: width, clientHeight: height } = renderer.canvas;
+                const places = [0.5, 0.02].map((y) => renderer.pick(0.5 * width, y * height));
+                return (await Promise.all(places)).map((pick) => pick.radiance);
+            })
+        );
+        for (const [found, expected] of [
+            [middle, throughPanes(camera)],
+            [beside, wall(camera)],
+        ]) {
+            const far = found.map((x, k) => Math.abs(x / expected[k] - 1));
+            // Half floats have eleven bits.
+            assert.ok(Math.max(...far) < 0.003, `${camera}: ${found}, by hand ${expected}`);
+        }
+        const how = ["--method", "gather", "--spp", "4", "--exposure", "0", "--tone", "none"];
+        run("render", "panes.twin", ...how, "--camera", camera, "--size", size, "-o", "panes.png");
+        const { ratio } = await compared(base64, readFileSync(join(folder, "panes.png"), "base64"));
+        assert.ok(
+            ratio.every((r) => Math.abs(r - 1) < MEAN),
+            `${camera}: means differ by ${ratio}`,
+        );
+    }
     assert.deepEqual(complaints, []);
     await page.close();
 });
