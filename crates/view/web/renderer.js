@@ -39,6 +39,8 @@ const CURVES = ["agx", "aces", "reinhard", "none"];
 export class Renderer {
     /** Called after every frame. @type {((info: FrameInfo) => void)|null} */
     onframe = null;
+    /** Called where the graphics processor was taken away. @type {(() => void)|null} */
+    onlost = null;
     /** @type {Options} */
     options = {
         exposure: null,
@@ -119,7 +121,10 @@ export class Renderer {
         this.frame = null;
         /** @type {Target[]} */
         this.means = [];
-        canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+        canvas.addEventListener("webglcontextlost", (event) => {
+            event.preventDefault();
+            if (!this.#disposed) this.onlost?.();
+        });
         canvas.addEventListener("webglcontextrestored", () => {
             if (!this.#disposed) location.reload();
         });
@@ -213,7 +218,7 @@ export class Renderer {
      */
     async pick(x, y) {
         const { gl, canvas, walk, resources } = this;
-        if (!this.#view) return null;
+        if (!this.#view || gl.isContextLost()) return null;
         const [width, height] = [canvas.clientWidth, canvas.clientHeight];
         const at = [(2 * (x + 0.5)) / width - 1, 1 - (2 * (y + 0.5)) / height];
         const { viewProjection } = matrices(
@@ -250,6 +255,7 @@ export class Renderer {
 
     /** The picture as a PNG file. @returns {Promise<Blob>} */
     screenshot() {
+        if (this.gl.isContextLost()) return Promise.reject(new Error("there is no picture at the moment"));
         this.#show();
         return new Promise((done, fail) =>
             this.canvas.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"),
@@ -283,7 +289,7 @@ export class Renderer {
     /** @param {number} time */
     #draw(time) {
         this.#requested = 0;
-        if (!this.#view || !this.frame || !this.#hasLight) return;
+        if (!this.#view || !this.frame || !this.#hasLight || this.gl.isContextLost()) return;
         // Frames that follow each other tell how fast they are.
         if (this.#follows) this.#slow = time - this.#lastFrame > SLOW;
         this.#follows = false;

@@ -65,6 +65,7 @@ export function panesFile() {
     square("near wall", 6, 3, -1, wall(WALLS.back));
     nodes.push({ name: "front", camera: 0, translation: [0, 0, 2.5] });
     nodes.push({ name: "back", camera: 0, translation: [0, 0, -2.5], rotation: [0, 1, 0, 0] });
+    nodes.push({ name: "plan", camera: 1, translation: [0, 0, 2] });
     const bytes = Buffer.from(new Float32Array(numbers).buffer);
     return JSON.stringify({
         asset: { version: "2.0" },
@@ -74,7 +75,10 @@ export function panesFile() {
         ],
         bufferViews: [{ buffer: 0, byteLength: bytes.length }],
         ...{ accessors, meshes, nodes, materials },
-        cameras: [{ type: "perspective", perspective: { yfov: 1, znear: 0.01 } }],
+        cameras: [
+            { type: "perspective", perspective: { yfov: 1, znear: 0.01 } },
+            { type: "orthographic", orthographic: { xmag: 1, ymag: 1, znear: 0.01, zfar: 9 } },
+        ],
         scenes: [{ nodes: [...nodes.keys()] }],
         scene: 0,
     });

@@ -417,3 +417,134 @@ test("panes behind panes are as bright and as coloured from either side as by ha
     assert.deepEqual(complaints, []);
     await page.close();
 });
+
+/** A page of the panes, from the disk. @param {string} [hash] */
+async function openPanes(hash = "") {
+    const file = join(folder, "window.html");
+    if (!existsSync(file)) {
+        writeFileSync(join(folder, "window.gltf"), panesFile());
+        run("solve", "window.gltf", "--patches", "2k", "--rays", "20k", "-o", "window.twin");
+        run("export", "window.twin", "-o", "window.html");
+    }
+    return open(pathToFileURL(file).href + hash);
+}
+
+/** What the middle of the picture shows, once the view rests. @param {Page} page @returns {Promise<number[]>} */
+async function middle(page) {
+    await rested(page);
+    return /** @type {any} */ (
+        await page.evaluate(async () => {
+            const { renderer } = /** @type {any} */ (globalThis).twinray;
+            const { clientWidth: width, clientHeight: height } = renderer.canvas;
+            return (await renderer.pick(width / 2, height / 2)).radiance;
+        })
+    );
+}
+
+/** @param {number[]} found @param {number[]} expected */
+const isSeen = (found, expected) =>
+    assert.ok(
+        found.every((x, k) => Math.abs(x / expected[k] - 1) < 0.003),
+        `${found}, by hand ${expected}`,
+    );
+
+test("a lost graphics processor is told, and the same view comes back with it", { skip }, async () => {
+    const { page, complaints } = await openPanes();
+    await page.evaluate(() => {
+        const { camera, walk } = /** @type {any} */ (globalThis).twinray;
+        camera.set(walk.cameras[1]);
+    });
+    isSeen(await middle(page), throughPanes("back"));
+    const pose = "JSON.stringify(window.twinray.camera.pose.eye.map((x) => Math.round(1e3 * x)))";
+    const before = await page.evaluate(pose);
+    // Lost in the midst of a movement: its last step is what has to come back.
+    const found = await page.evaluate(async () => {
+        const global = /** @type {any} */ (globalThis);
+        const { renderer, camera } = global.twinray;
+        global.context = renderer.gl.getExtension("WEBGL_lose_context");
+        global.context.loseContext();
+        await new Promise((done) => renderer.canvas.addEventListener("webglcontextlost", done, { once: true }));
+        camera.move([0.25, 0, 0]);
+        renderer.resize();
+        camera.move([-0.25, 0, 0]);
+        await new Promise((done) => setTimeout(done, 300));
+        const refused = await renderer.screenshot().then(
+            () => false,
+            () => true,
+        );
+        return { pick: await renderer.pick(9, 9), refused, resting: renderer.state.resting };
+    });
+    assert.deepEqual(found, { pick: null, refused: true, resting: true });
+    assert.match(String(await page.$eval("#toast", (note) => note.textContent)), /comes back/);
+    await Promise.all([page.waitForNavigation(), page.evaluate("globalThis.context.restoreContext()")]);
+    await page.waitForFunction("window.twinray?.renderer.state.frames > 0", { timeout: 60_000 });
+    assert.equal(await page.evaluate(pose), before);
+    isSeen(await middle(page), throughPanes("back"));
+    // Chromium itself may say that a context was lost.
+    assert.deepEqual(
+        complaints.filter((c) => !/CONTEXT_LOST|context lost/i.test(c)),
+        [],
+    );
+    await page.close();
+});
+
+test("the picture has the pixels of its window, panel and screen, and is right in each", { skip }, async () => {
+    const { page, complaints } = await openPanes();
+    const sizes = async () => {
+        isSeen(await middle(page), throughPanes("front"));
+        return /** @type {any} */ (
+            await page.evaluate(() => {
+                const { canvas } = /** @type {any} */ (globalThis).twinray.renderer;
+                const frame = /** @type {any} */ (globalThis).twinray.camera.aspect;
+                const ratio = Math.min(devicePixelRatio, 2);
+                const fits =
+                    canvas.width === Math.round(canvas.clientWidth * ratio) &&
+                    canvas.height === Math.round(canvas.clientHeight * ratio);
+                const aspect = Math.abs(frame - canvas.clientWidth / canvas.clientHeight) < 1e-9;
+                return { width: canvas.width, height: canvas.height, fits: fits && aspect };
+            })
+        );
+    };
+    const first = await sizes();
+    assert.ok(first.fits);
+    await page.focus("canvas");
+    await page.keyboard.press("p");
+    await page.waitForFunction(`window.twinray.renderer.canvas.width > ${first.width}`);
+    const wide = await sizes();
+    assert.ok(wide.fits && wide.height === first.height, JSON.stringify(wide));
+    await page.setViewport({ width: 600, height: 400 });
+    await page.waitForFunction("window.twinray.renderer.canvas.width <= 600");
+    assert.ok((await sizes()).fits);
+    // As a page is zoomed: without a window, Chromium tells nobody of another ratio alone. More than 2 is not worth its time.
+    for (const [deviceScaleFactor, width, pixels] of [
+        [1.5, 400, 600],
+        [3, 300, 600],
+        [1, 600, 600],
+    ]) {
+        await page.setViewport({ width, height: 400, deviceScaleFactor });
+        await page.waitForFunction(`innerWidth === ${width} && window.twinray.renderer.canvas.width === ${pixels}`);
+        assert.ok((await sizes()).fits);
+    }
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
+
+test("a camera without perspective is seen in one from the same place, which its button says", { skip }, async () => {
+    const { page, complaints } = await openPanes();
+    const button = await page.$eval("#cameras button:nth-of-type(3)", (b) => ({
+        text: b.textContent,
+        title: /** @type {HTMLElement} */ (b).title,
+    }));
+    assert.equal(button.text, "plan (in perspective)");
+    assert.match(button.title, /A parallel projection, shown in perspective from the same place/);
+    assert.equal(await page.$eval("#cameras button", (b) => b.textContent), "front");
+    await page.click("#cameras button:nth-of-type(3)");
+    isSeen(await middle(page), throughPanes("front"));
+    const { eye, fov } = /** @type {any} */ (await page.evaluate("window.twinray.camera.pose"));
+    assert.ok(Math.hypot(eye[0], eye[1], eye[2] - 2) < 1e-6, String(eye));
+    // Half of its height is 1, at a distance of 2.
+    assert.ok(Math.abs(fov - 2 * Math.atan(0.5)) < 1e-6, String(fov));
+    await page.screenshot({ path: join(PICTURES, "plan.png") });
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
