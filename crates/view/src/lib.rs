@@ -4,6 +4,7 @@
 //! [`page`] puts the files of `web/` together; [`server`] serves them to this machine alone, with whatever [`feed`] has
 //! last been given. Nothing here solves, reads a scene or writes a file: the command does.
 
+mod connection;
 pub mod container;
 pub mod feed;
 pub mod light;

@@ -20,8 +20,14 @@ use crate::textures::Textures;
 const TABLE: u32 = 32;
 /// The sky's picture.
 const SKY: [u32; 2] = [512, 256];
-/// Vertical field of view for cameras that have none, radians.
+/// Vertical fields of view for cameras that have none, radians: of a parallel projection that looks past the scene; of a
+/// panorama, and at most of a fisheye, since a plane film stretches more than that too far.
 const FIELD_OF_VIEW: f64 = 1.0;
+const WIDE_FIELD_OF_VIEW: f64 = 1.5;
+/// What the page allows.
+const FIELDS_OF_VIEW: [f64; 2] = [0.175, 2.09];
+/// A parallel projection's scene lies ahead if its middle is so far, in radii of the scene.
+const AHEAD: f64 = 0.05;
 
 /// What is said of a scene beside its surfaces.
 #[derive(Clone, Debug)]
@@ -68,7 +74,7 @@ pub fn package(scene: &PatchScene, nodes: &Nodes, about: &About) -> Vec<u8> {
     let materials: Vec<Value> = scene.materials().iter().map(|m| material(m, &mut textures)).collect();
     let images = textures.write(scene.images(), &mut container);
     let bounds = vertices.bounds();
-    let cameras: Vec<Value> = about.cameras.iter().map(|c| camera(c, scene.centre())).collect();
+    let cameras: Vec<Value> = about.cameras.iter().map(|c| camera(c, scene.centre(), scene.radius())).collect();
     container.finish(json!({
         "version": 1,
         "id": id(scene, nodes),
@@ -203,12 +209,24 @@ fn material(material: &Material, textures: &mut Textures) -> Value {
     })
 }
 
-fn camera(camera: &Camera, centre: DVec3) -> Value {
-    let fov =
-        if let Projection::Perspective { vertical_fov } = camera.projection { vertical_fov } else { FIELD_OF_VIEW };
+/// A camera as the page's perspective one: what is no perspective is seen from the same place, and says what it is.
+fn camera(camera: &Camera, centre: DVec3, radius: f64) -> Value {
+    let (eye, forward) = (camera.eye - centre, camera.forward.normalize());
+    let [least, most] = FIELDS_OF_VIEW;
+    let (fov, projection) = match camera.projection {
+        Projection::Perspective { vertical_fov } => (vertical_fov, "perspective"),
+        Projection::Orthographic { half_height } => {
+            // As much of the scene's middle as the parallel picture has.
+            let depth = -eye.dot(forward);
+            let fits = 2.0 * (half_height / depth).atan();
+            (if depth > AHEAD * radius { fits.clamp(least, most) } else { FIELD_OF_VIEW }, "parallel")
+        }
+        Projection::Panorama => (WIDE_FIELD_OF_VIEW, "panorama"),
+        Projection::Fisheye { angle } => (angle.clamp(least, WIDE_FIELD_OF_VIEW), "fisheye"),
+    };
     json!({
-        "name": camera.name, "eye": (camera.eye - centre).to_array(), "fov": fov,
-        "forward": camera.forward.normalize().to_array(), "up": camera.up.normalize_or(DVec3::Y).to_array(),
+        "name": camera.name, "eye": eye.to_array(), "fov": fov, "projection": projection,
+        "forward": forward.to_array(), "up": camera.up.normalize_or(DVec3::Y).to_array(),
     })
 }
 
@@ -309,5 +327,35 @@ impl Vertices {
             self.list.iter().fold([start; 3], |b, v| [0, 1, 2].map(|k| f(b[k], v.position[k])))
         };
         [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_without_a_perspective_get_one_from_the_same_place() {
+        let centre = DVec3::new(10.0, 0.0, 0.0);
+        let packed = |projection, eye| {
+            let looking = Camera::look_at("c", eye, eye - DVec3::Z, DVec3::Y, 40.0);
+            camera(&Camera { projection, ..looking }, centre, 5.0)
+        };
+        let before = centre + 4.0 * DVec3::Z;
+        let fov = |value: &Value| value["fov"].as_f64().unwrap();
+        // Half of the height, at the distance of the scene's middle.
+        let parallel = packed(Projection::Orthographic { half_height: 3.0 }, before);
+        assert!((fov(&parallel) - 2.0 * 0.75_f64.atan()).abs() < 1e-12, "{parallel}");
+        assert_eq!((&parallel["projection"], &parallel["eye"]), (&json!("parallel"), &json!([0.0, 0.0, 4.0])));
+        for (projection, eye, expected) in [
+            (Projection::Orthographic { half_height: 3.0 }, centre - DVec3::Z, FIELD_OF_VIEW),
+            (Projection::Orthographic { half_height: 1e9 }, before, FIELDS_OF_VIEW[1]),
+            (Projection::Panorama, before, WIDE_FIELD_OF_VIEW),
+            (Projection::Fisheye { angle: 3.1 }, before, WIDE_FIELD_OF_VIEW),
+            (Projection::Fisheye { angle: 0.7 }, before, 0.7),
+            (Projection::Perspective { vertical_fov: 2.5 }, before, 2.5),
+        ] {
+            assert!((fov(&packed(projection, eye)) - expected).abs() < 1e-12, "{projection:?}");
+        }
     }
 }

@@ -2,29 +2,31 @@
 //!
 //! Every address begins with the token, which other programs and other users' pages cannot guess; the host must be the
 //! loopback's, so that no name that was pointed here reaches it (DNS rebinding); whatever a browser marks as coming from
-//! another origin is refused. Requests for new light wait until there is some.
+//! another origin is refused. Requests for new light wait until there is some. Connections that show no token are ended
+//! soon, and at once where others need their place.
 
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use crate::connection::{Guests, Limits, Timed, write_steadily};
 use crate::feed::Feed;
 use crate::page;
 
 /// How long a request for light waits.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Connections at once, at most; more are closed.
+/// Connections at once, at most. For one more, the oldest goes that has not shown the token; without such a one it is closed.
 const MOST_CONNECTIONS: usize = 256;
+/// The same with those that were told to go and have not gone yet.
+const MOST_THREADS: usize = 2 * MOST_CONNECTIONS;
 /// Bytes of a request at most, and how many headers.
 const MOST_BYTES: u64 = 32_768;
 const MOST_HEADERS: usize = 64;
 /// How long the listener rests where it got no connection.
 const PAUSE: Duration = Duration::from_millis(50);
-/// How long a connection may be idle.
-const IDLE: Duration = Duration::from_secs(60);
 
 /// Why there is no server.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +68,8 @@ struct Inner {
     token: String,
     hosts: [String; 2],
     connections: AtomicUsize,
+    guests: Guests,
+    limits: Limits,
     ended: AtomicBool,
 }
 
@@ -92,12 +96,17 @@ impl Running {
     /// # Errors
     /// If the port cannot be had.
     pub fn start(site: Site, port: u16, token: String) -> Result<Self, ServerError> {
+        Self::start_with(site, port, token, Limits::default())
+    }
+
+    fn start_with(site: Site, port: u16, token: String, limits: Limits) -> Result<Self, ServerError> {
         let fail = |e: io::Error| ServerError::Port { port, reason: e.to_string() };
         let sockets = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(fail)?;
         let address = sockets.local_addr().map_err(fail)?;
         let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", address.port()));
         let (connections, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let server = Arc::new(Inner { site, token, hosts, connections, ended });
+        let guests = Guests::default();
+        let server = Arc::new(Inner { site, token, hosts, connections, guests, limits, ended });
         let listener = std::thread::spawn({
             let server = server.clone();
             move || listen(&sockets, &server)
@@ -135,18 +144,25 @@ fn listen(sockets: &TcpListener, server: &Arc<Inner>) {
             std::thread::sleep(PAUSE);
             continue;
         };
-        let (counted, server) = (server.clone(), server.clone());
-        if server.connections.fetch_add(1, Ordering::SeqCst) < MOST_CONNECTIONS {
-            let serving = std::thread::Builder::new().spawn(move || {
+        let before = server.connections.fetch_add(1, Ordering::SeqCst);
+        if before >= MOST_THREADS || before >= MOST_CONNECTIONS && !server.guests.make_room() {
+            server.connections.fetch_sub(1, Ordering::SeqCst);
+            continue;
+        }
+        let (connection, serving) = (Arc::new(connection), server.clone());
+        server.guests.enter(&connection);
+        let thread = std::thread::Builder::new().spawn({
+            let connection = connection.clone();
+            move || {
                 // Whoever goes away, or sends what is no request, gets no answer.
-                drop(server.serve(&connection));
+                drop(serving.serve(&connection));
                 drop(connection.shutdown(Shutdown::Both));
-                server.connections.fetch_sub(1, Ordering::SeqCst);
-            });
-            if serving.is_err() {
-                counted.connections.fetch_sub(1, Ordering::SeqCst);
+                serving.guests.leave(&connection);
+                serving.connections.fetch_sub(1, Ordering::SeqCst);
             }
-        } else {
+        });
+        if thread.is_err() {
+            server.guests.leave(&connection);
             server.connections.fetch_sub(1, Ordering::SeqCst);
         }
     }
@@ -189,6 +205,13 @@ impl Request {
         }
     }
 
+    /// The token, what stands behind it, and the query.
+    fn parts(&self) -> (&str, Option<&str>, &str) {
+        let (path, query) = self.target.split_once('?').unwrap_or((&self.target, ""));
+        let mut parts = path.trim_start_matches('/').splitn(2, '/');
+        (parts.next().unwrap_or(""), parts.next(), query)
+    }
+
     fn header(&self, name: &str) -> Option<&str> {
         self.headers.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)).map(|(_, value)| value.as_str())
     }
@@ -202,7 +225,7 @@ struct Answer {
 }
 
 impl Answer {
-    fn write(&self, mut to: impl Write) -> io::Result<()> {
+    fn write(&self, to: &TcpStream, stall: Duration) -> io::Result<()> {
         let reason = match self.status {
             200 => "OK",
             204 => "No Content",
@@ -220,9 +243,8 @@ impl Answer {
             head += &format!("Content-Length: {}\r\n", self.body.len());
         }
         head += "\r\n";
-        to.write_all(head.as_bytes())?;
-        to.write_all(&self.body)?;
-        to.flush()
+        write_steadily(to, head.as_bytes(), stall)?;
+        write_steadily(to, &self.body, stall)
     }
 }
 
@@ -241,28 +263,39 @@ fn with(body: impl Into<Arc<Vec<u8>>>, kind: &str, more: &[(&'static str, &str)]
 
 fn plain(status: u16, text: &str) -> Answer {
     let body = if text.is_empty() { Vec::new() } else { format!("{text}\n").into_bytes() };
-    Answer { status, ..with(body, "text/plain; charset=utf-8", &[]) }
+    let more: &[_] = if status == 403 { &[("Connection", "close")] } else { &[] };
+    Answer { status, ..with(body, "text/plain; charset=utf-8", more) }
 }
 
 impl Inner {
     /// Answers whatever a connection asks, until it ends.
-    fn serve(&self, connection: &TcpStream) -> io::Result<()> {
-        connection.set_read_timeout(Some(IDLE))?;
-        connection.set_write_timeout(Some(IDLE))?;
+    fn serve(&self, connection: &Arc<TcpStream>) -> io::Result<()> {
+        let Limits { head, idle, stall } = self.limits;
         connection.set_nodelay(true)?;
-        let mut reader = BufReader::new(connection);
+        let mut reader = BufReader::new(Timed::new(connection, head));
         while let Some(request) = Request::read(&mut reader)? {
-            self.response(&request).write(connection)?;
+            if let Some(refusal) = self.refusal(&request) {
+                // Whoever is refused has nothing more to ask here.
+                return refusal.write(connection, stall);
+            }
+            self.guests.leave(connection);
+            self.response(&request).write(connection, stall)?;
             if self.ended.load(Ordering::SeqCst) {
                 break;
             }
+            reader.get_mut().within(idle);
+            if reader.fill_buf()?.is_empty() {
+                break;
+            }
+            reader.get_mut().within(head);
         }
         Ok(())
     }
 
-    fn response(&self, request: &Request) -> Answer {
+    /// Why a request gets nothing; `None` for one of the page.
+    fn refusal(&self, request: &Request) -> Option<Answer> {
         if !request.header("Host").is_some_and(|h| self.hosts.iter().any(|ours| ours == h)) {
-            return plain(403, "this server is for 127.0.0.1 alone");
+            return Some(plain(403, "this server is for 127.0.0.1 alone"));
         }
         let ours = |origin: &str| self.hosts.iter().any(|h| origin == format!("http://{h}"));
         let foreign_origin = request.header("Origin").is_some_and(|o| !ours(o));
@@ -272,14 +305,16 @@ impl Inner {
             && request.header("Sec-Fetch-Mode") == Some("navigate")
             && request.header("Sec-Fetch-Dest") == Some("document");
         if foreign_origin || foreign_site && !is_link {
-            return plain(403, "this server is for its own page alone");
+            return Some(plain(403, "this server is for its own page alone"));
         }
-        let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
-        let mut parts = path.trim_start_matches('/').splitn(2, '/');
-        let (token, rest) = (parts.next().unwrap_or(""), parts.next());
-        if !equal(token, &self.token) {
-            return plain(403, "the address lacks the token: take the whole line that twinray printed");
-        }
+        let (token, ..) = request.parts();
+        let refused = !equal(token, &self.token);
+        refused.then(|| plain(403, "the address lacks the token: take the whole line that twinray printed"))
+    }
+
+    /// What a request of the page gets.
+    fn response(&self, request: &Request) -> Answer {
+        let (_, rest, query) = request.parts();
         let feed = &self.site.feed;
         match (request.method.as_str(), rest) {
             ("GET", None) => {
@@ -331,7 +366,7 @@ fn equal(a: &str, b: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Read;
+    use std::io::{Read, Write};
 
     const TOKEN: &str = "0123456789abcdef";
 
@@ -430,6 +465,109 @@ mod tests {
             let mut body = vec![0; length];
             reader.read_exact(&mut body).unwrap();
             assert_eq!(body, [7; 9]);
+        }
+    }
+
+    const MODULE: &str = "GET /0123456789abcdef/vec.js HTTP/1.1\r\nHost: HOST\r\n\r\n";
+
+    /// A server whose limits a test can wait for.
+    fn hasty(scene: usize, limits: Limits) -> Running {
+        let site = Site { name: "test".to_owned(), scene: Arc::new(vec![7; scene]), feed: Arc::default() };
+        Running::start_with(site, 0, TOKEN.to_owned(), limits).unwrap()
+    }
+
+    /// Long enough that nothing is ended by it in a test.
+    const LONG: Duration = Duration::from_secs(3600);
+
+    /// Until the server has ended the connection: what came before that, for a reader that reads.
+    fn rest_of(mut connection: &TcpStream) -> Vec<u8> {
+        let (mut all, mut bytes) = (Vec::new(), [0; 4096]);
+        // A reset is an end like another.
+        while let Ok(n @ 1..) = connection.read(&mut bytes) {
+            all.extend(&bytes[..n]);
+        }
+        all
+    }
+
+    /// Until no connection is served any more.
+    fn empty(server: &Running) {
+        while server.server.connections.load(Ordering::SeqCst) > 0 {
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    #[test]
+    fn a_head_that_never_ends_does_not_hold_its_place() {
+        let server = hasty(9, Limits { head: Duration::from_millis(300), idle: LONG, stall: LONG });
+        // One says nothing, one a byte now and then, which starts no limit anew.
+        let silent = TcpStream::connect(server.address).unwrap();
+        let mut slow = TcpStream::connect(server.address).unwrap();
+        while slow.write_all(b"G").is_ok() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert_eq!(rest_of(&silent), b"");
+        // The same for the second request of one that has shown the token.
+        let mut known = connected(&server, MODULE);
+        known.read_exact(&mut [0; 12]).unwrap();
+        known.write_all(b"GET /").unwrap();
+        assert!(!rest_of(&known).is_empty());
+        empty(&server);
+    }
+
+    #[test]
+    fn idle_connections_do_not_lock_out_the_page() {
+        // No deadline helps here: the page gets the place of a silent one.
+        let server = hasty(9, Limits { head: LONG, idle: LONG, stall: LONG });
+        let silent: Vec<TcpStream> =
+            (0..MOST_CONNECTIONS + 20).map(|_| TcpStream::connect(server.address).unwrap()).collect();
+        assert_eq!(status(&server, MODULE), 200);
+        assert_eq!(rest_of(&silent[0]), b"", "the oldest went");
+        assert_eq!(status(&server, &MODULE.replace(TOKEN, "nonsense")), 403);
+        assert_eq!(status(&server, MODULE), 200);
+    }
+
+    #[test]
+    fn whoever_has_shown_the_token_keeps_its_place() {
+        let server = hasty(9, Limits { head: LONG, idle: LONG, stall: LONG });
+        let mut known = connected(&server, MODULE);
+        known.read_exact(&mut [0; 12]).unwrap();
+        let _silent: Vec<TcpStream> =
+            (0..MOST_CONNECTIONS + 20).map(|_| TcpStream::connect(server.address).unwrap()).collect();
+        assert_eq!(status(&server, MODULE), 200);
+        let request = MODULE.replace("HOST", &server.address.to_string()).replace("vec.js", "nothing.js");
+        known.write_all(request.as_bytes()).unwrap();
+        let mut text = Vec::new();
+        while !text.ends_with(b"404 Not Found") {
+            let mut byte = [0];
+            known.read_exact(&mut byte).unwrap();
+            text.push(byte[0]);
+        }
+    }
+
+    #[test]
+    fn a_refused_connection_is_ended() {
+        let server = hasty(9, Limits { head: LONG, idle: LONG, stall: LONG });
+        let answer = rest_of(&connected(&server, &MODULE.replace(TOKEN, "nonsense")));
+        assert!(String::from_utf8_lossy(&answer).contains("Connection: close"));
+        empty(&server);
+    }
+
+    #[test]
+    fn a_reader_that_does_not_read_is_left_and_one_that_reads_slowly_gets_all() {
+        // More than sockets keep for a reader.
+        let scene = 64 << 20;
+        let server = hasty(scene, Limits { head: LONG, idle: LONG, stall: Duration::from_secs(2) });
+        let request = MODULE.replace("vec.js", "scene");
+        let mut unread = connected(&server, &request);
+        // It is served from here on.
+        unread.read_exact(&mut [0; 12]).unwrap();
+        empty(&server);
+        assert!(rest_of(&unread).len() < scene);
+        let mut slow = connected(&server, &request);
+        let mut part = vec![0; scene / 16];
+        for _ in 0..16 {
+            slow.read_exact(&mut part).unwrap();
+            std::thread::sleep(Duration::from_millis(50));
         }
     }
 

@@ -118,4 +118,17 @@ export function createActions(parts) {
 }
 
 /** What a camera of the scene is called. @param {Walk} walk @param {number} index */
-export const cameraName = (walk, index) => walk.cameras[index].name || `Camera ${index + 1}`;
+export const cameraName = (walk, index) =>
+    (walk.cameras[index].name || `Camera ${index + 1}`) + (isPlain(walk, index) ? "" : " (in perspective)");
+
+/** What a camera is in the scene, where the page has to show something else. @param {Walk} walk @param {number} index */
+export const cameraNote = (walk, index) =>
+    isPlain(walk, index)
+        ? ""
+        : `${PROJECTIONS[walk.cameras[index].projection ?? ""] ?? "Another projection"}, shown in perspective from the same place`;
+
+/** @type {Record<string, string>} */
+const PROJECTIONS = { parallel: "A parallel projection", panorama: "A panorama", fisheye: "A fisheye" };
+
+/** @param {Walk} walk @param {number} index */
+const isPlain = (walk, index) => (walk.cameras[index].projection ?? "perspective") === "perspective";

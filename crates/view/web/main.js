@@ -4,7 +4,7 @@
  */
 
 import { createActions } from "twinray/actions.js";
-import { element } from "twinray/announce.js";
+import { element, toast } from "twinray/announce.js";
 import { Camera, overview } from "twinray/camera.js";
 import { Controls } from "twinray/controls.js";
 import { showLegend } from "twinray/legend.js";
@@ -26,6 +26,8 @@ import { loadWalk } from "twinray/walk.js";
 
 /** A camera that has not moved for so long is at rest. */
 const REST_MILLISECONDS = 200;
+/** Long enough that nobody wonders at an empty picture. */
+const LOST_MILLISECONDS = 60_000;
 
 try {
     await start();
@@ -123,11 +125,18 @@ async function start() {
         panel.inUse(info.exposure, info.illuminanceRange);
         showLegend(scale());
     };
-    new ResizeObserver(() => {
+    renderer.onlost = () => {
+        // What is shown stands in the address by the time the page loads again.
+        address.flush();
+        toast("The graphics processor was taken away; the picture comes back with it", LOST_MILLISECONDS);
+    };
+    const resized = () => {
         camera.aspect = canvas.clientWidth / (canvas.clientHeight || 1);
         renderer.resize();
         draw();
-    }).observe(canvas);
+    };
+    new ResizeObserver(resized).observe(canvas);
+    onPixelRatio(resized);
     window.addEventListener("hashchange", () => {
         if (location.hash === address.written) return;
         const next = parse(walk, location.hash);
@@ -145,6 +154,15 @@ async function start() {
     document.body.dataset.page = "ready";
     if (!location.hash) welcome(settings.values.mode);
     Object.assign(window, { twinray: { walk, renderer, camera, live: solve?.live ?? null, settings, readings } });
+}
+
+/** Tells of pixels of another size, as on another screen, which change no length on the page. @param {() => void} tell */
+function onPixelRatio(tell) {
+    const changed = () => {
+        tell();
+        onPixelRatio(tell);
+    };
+    matchMedia(`(resolution: ${devicePixelRatio}dppx)`).addEventListener("change", changed, { once: true });
 }
 
 /** Says why there is nothing to see. @param {string} message */

@@ -2,7 +2,7 @@
  * The panel's controls, bound both ways to the settings and the camera. What they do to the picture is not decided here.
  */
 
-import { cameraName } from "twinray/actions.js";
+import { cameraName, cameraNote } from "twinray/actions.js";
 import { element } from "twinray/announce.js";
 import { samePose } from "twinray/camera.js";
 import { count, number, stops } from "twinray/colours.js";
@@ -95,7 +95,8 @@ export class Panel {
             const button = document.createElement("button");
             button.type = "button";
             button.textContent = cameraName(this.#walk, i);
-            button.title = i < 9 ? `${button.textContent} (${i + 1})` : button.textContent;
+            const note = cameraNote(this.#walk, i);
+            button.title = `${button.textContent}${i < 9 ? ` (${i + 1})` : ""}${note && `: ${note}`}`;
             button.addEventListener("click", () => act.camera(i));
             return button;
         });

@@ -1,6 +1,7 @@
 // Pictures of a walk: frames while the view moves, their means while it rests, and what lies under a point.
 
 import { Resources } from "twinray/resources.js";
+import { SeeThrough } from "twinray/see-through.js";
 import { matrices } from "twinray/projection.js";
 import { find, irradianceAt, medianRange } from "twinray/lookup.js";
 import {
@@ -8,6 +9,7 @@ import {
     MEAN_FRAGMENT,
     METER_FRAGMENT,
     PICK_FRAGMENT,
+    PIECE_VERTEX,
     SHOW_FRAGMENT,
     SKY_FRAGMENT,
     SURFACE_FRAGMENT,
@@ -37,6 +39,8 @@ const CURVES = ["agx", "aces", "reinhard", "none"];
 export class Renderer {
     /** Called after every frame. @type {((info: FrameInfo) => void)|null} */
     onframe = null;
+    /** Called where the graphics processor was taken away. @type {(() => void)|null} */
+    onlost = null;
     /** @type {Options} */
     options = {
         exposure: null,
@@ -102,6 +106,10 @@ export class Renderer {
             show: program(gl, FILM_VERTEX, SHOW_FRAGMENT),
         };
         this.resources = new Resources(gl, walk, () => this.#restart());
+        const panes = this.resources.batches.filter((batch) => batch.seeThrough);
+        /** Another shader, and a tree of planes, only where there is something to see through. */
+        this.seeThrough = panes.length > 0 ? new SeeThrough(gl, walk, panes) : null;
+        this.pieces = this.seeThrough && program(gl, PIECE_VERTEX, SURFACE_FRAGMENT);
         this.empty = gl.createVertexArray();
         this.white = pixel(gl, [255, 255, 255, 255]);
         this.flat = pixel(gl, [128, 128, 255, 255]);
@@ -113,7 +121,10 @@ export class Renderer {
         this.frame = null;
         /** @type {Target[]} */
         this.means = [];
-        canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+        canvas.addEventListener("webglcontextlost", (event) => {
+            event.preventDefault();
+            if (!this.#disposed) this.onlost?.();
+        });
         canvas.addEventListener("webglcontextrestored", () => {
             if (!this.#disposed) location.reload();
         });
@@ -207,7 +218,7 @@ export class Renderer {
      */
     async pick(x, y) {
         const { gl, canvas, walk, resources } = this;
-        if (!this.#view) return null;
+        if (!this.#view || gl.isContextLost()) return null;
         const [width, height] = [canvas.clientWidth, canvas.clientHeight];
         const at = [(2 * (x + 0.5)) / width - 1, 1 - (2 * (y + 0.5)) / height];
         const { viewProjection } = matrices(
@@ -221,7 +232,7 @@ export class Renderer {
         gl.viewport(0, 0, 1, 1);
         gl.clearBufferuiv(gl.COLOR, 0, [0, 0, 0, 0]);
         gl.clearBufferfv(gl.DEPTH, 0, [1]);
-        this.#drawSurfaces(this.programs.pick, viewProjection, (batch) => !batch.seeThrough);
+        this.#drawSurfaces(this.programs.pick, viewProjection);
         const found = new Uint32Array(4);
         gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, found);
         if (found[0] === 0) return null;
@@ -244,6 +255,7 @@ export class Renderer {
 
     /** The picture as a PNG file. @returns {Promise<Blob>} */
     screenshot() {
+        if (this.gl.isContextLost()) return Promise.reject(new Error("there is no picture at the moment"));
         this.#show();
         return new Promise((done, fail) =>
             this.canvas.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"),
@@ -277,7 +289,7 @@ export class Renderer {
     /** @param {number} time */
     #draw(time) {
         this.#requested = 0;
-        if (!this.#view || !this.frame || !this.#hasLight) return;
+        if (!this.#view || !this.frame || !this.#hasLight || this.gl.isContextLost()) return;
         // Frames that follow each other tell how fast they are.
         if (this.#follows) this.#slow = time - this.#lastFrame > SLOW;
         this.#follows = false;
@@ -371,7 +383,7 @@ export class Renderer {
             uSampled: light.hasSamples ? 1 : 0,
             uSeed: [this.#drawn * 1.37, this.#drawn * 2.11, this.#drawn + 0.5],
         };
-        this.#drawSurfaces(this.programs.surface, viewProjection, (batch) => !batch.seeThrough, uniforms);
+        this.#drawSurfaces(this.programs.surface, viewProjection, uniforms);
         gl.enable(gl.DEPTH_TEST);
         gl.depthFunc(gl.LEQUAL);
         const sky = resources.sky ? walk.scene.header.sky.scale * this.#baked : 0;
@@ -380,24 +392,69 @@ export class Renderer {
             uRay: ray,
             uScale: [sky, options.falseColour ? 1 : 0],
         });
-        if (!options.falseColour && resources.batches.some((batch) => batch.seeThrough)) {
-            gl.enable(gl.BLEND);
-            gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-            gl.depthMask(false);
-            this.#drawSurfaces(this.programs.surface, viewProjection, (batch) => batch.seeThrough, uniforms);
-            gl.depthMask(true);
-            gl.disable(gl.BLEND);
-        }
+        if (!options.falseColour) this.#drawSeeThrough(view, viewProjection, uniforms);
         gl.disable(gl.DEPTH_TEST);
     }
 
     /**
      * @param {Program} program
      * @param {Float32Array} viewProjection
-     * @param {(batch: import("twinray/resources.js").Batch) => boolean} wanted
      * @param {Record<string, any>} uniforms
      */
-    #drawSurfaces(program, viewProjection, wanted, uniforms = {}) {
+    #drawSurfaces(program, viewProjection, uniforms = {}) {
+        const { gl, resources } = this;
+        this.#prepare(program, viewProjection, { ...uniforms, uPass: 0 });
+        gl.bindVertexArray(resources.vertices);
+        for (const batch of resources.batches) {
+            if (batch.seeThrough) continue;
+            this.#take(program, batch);
+            gl.drawArrays(gl.TRIANGLES, 3 * batch.start, 3 * batch.count);
+        }
+        gl.bindVertexArray(null);
+        gl.disable(gl.CULL_FACE);
+    }
+
+    /**
+     * What can be seen through, over all else, from the farthest to the nearest.
+     * @param {Pose} view
+     * @param {Float32Array} viewProjection
+     * @param {Record<string, any>} uniforms
+     */
+    #drawSeeThrough(view, viewProjection, uniforms) {
+        const { gl, seeThrough, pieces } = this;
+        if (!seeThrough || !pieces) return;
+        seeThrough.sort(view.eye);
+        this.#prepare(pieces, viewProjection, uniforms);
+        gl.enable(gl.BLEND);
+        gl.depthMask(false);
+        gl.bindVertexArray(seeThrough.vertices);
+        /** @type {unknown} */
+        let taken = null;
+        for (const { start, count, batch, tinted } of seeThrough.runs) {
+            if (taken !== batch) this.#take(pieces, batch);
+            taken = batch;
+            const draw = (/** @type {number} */ pass, /** @type {number} */ source, /** @type {number} */ behind) => {
+                set(gl, pieces, { uPass: pass });
+                gl.blendFunc(source, behind);
+                gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * start);
+            };
+            if (tinted) {
+                draw(2, gl.ZERO, gl.SRC_COLOR);
+                draw(3, gl.ONE, gl.ONE);
+            } else draw(1, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+        }
+        gl.bindVertexArray(null);
+        gl.disable(gl.CULL_FACE);
+        gl.depthMask(true);
+        gl.disable(gl.BLEND);
+    }
+
+    /**
+     * @param {Program} program
+     * @param {Float32Array} viewProjection
+     * @param {Record<string, any>} uniforms
+     */
+    #prepare(program, viewProjection, uniforms) {
         const { gl, resources } = this;
         gl.useProgram(program.handle);
         set(gl, program, {
@@ -414,23 +471,25 @@ export class Renderer {
                 uLamps: resources.lamps,
             },
         });
-        const names = ["uBase", "uEmission", "uMetal", "uBumps"];
         gl.enable(gl.DEPTH_TEST);
         gl.depthFunc(gl.LESS);
         gl.cullFace(gl.BACK);
-        gl.bindVertexArray(resources.vertices);
-        for (const batch of resources.batches) {
-            if (!wanted(batch)) continue;
-            if (batch.twoSided) gl.disable(gl.CULL_FACE);
-            else gl.enable(gl.CULL_FACE);
-            /** @type {Record<string, WebGLTexture|null>} */
-            const textures = {};
-            names.forEach((name, k) => (textures[name] = batch.textures[k] ?? (k === 3 ? this.flat : this.white)));
-            set(gl, program, { textures, uHas: batch.textures.map((texture) => (texture ? 1 : 0)) });
-            gl.drawArrays(gl.TRIANGLES, 3 * batch.start, 3 * batch.count);
-        }
-        gl.bindVertexArray(null);
-        gl.disable(gl.CULL_FACE);
+    }
+
+    /**
+     * Sides and textures of a batch.
+     * @param {Program} program
+     * @param {import("twinray/resources.js").Batch} batch
+     */
+    #take(program, batch) {
+        const { gl } = this;
+        if (batch.twoSided) gl.disable(gl.CULL_FACE);
+        else gl.enable(gl.CULL_FACE);
+        /** @type {Record<string, WebGLTexture|null>} */
+        const textures = {};
+        const names = ["uBase", "uEmission", "uMetal", "uBumps"];
+        names.forEach((name, k) => (textures[name] = batch.textures[k] ?? (k === 3 ? this.flat : this.white)));
+        set(gl, program, { textures, uHas: batch.textures.map((texture) => (texture ? 1 : 0)) });
     }
 
     /**

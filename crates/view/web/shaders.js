@@ -40,6 +40,28 @@ ${OCTAHEDRON}void main() {
     gl_Position = uViewProjection * vec4(position, 1.0);
 }`;
 
+/** Pieces of triangles, which say themselves whose they are: see-through.js. */
+export const PIECE_VERTEX = `${HEAD}
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 texcoords;
+layout(location = 3) in vec2 place;
+layout(location = 4) in uint triangle;
+uniform mat4 uViewProjection;
+flat out uint vTriangle;
+out vec2 vPlace;
+out vec3 vPoint;
+out vec3 vNormal;
+out vec4 vTexcoords;
+void main() {
+    vTriangle = triangle;
+    vPlace = place;
+    vPoint = position;
+    vNormal = normal;
+    vTexcoords = texcoords;
+    gl_Position = uViewProjection * vec4(position, 1.0);
+}`;
+
 /** A triangle over the whole film. */
 export const FILM_VERTEX = `${HEAD}
 out vec2 vFilm;
@@ -131,6 +153,7 @@ uniform int uGlossySlots, uMode; /* 0 radiance, 1 illuminance */
 uniform bool uCells, uSampled;
 uniform bvec4 uHas; /* textures: base colour, emission, metalness and roughness, normals */
 uniform vec3 uSeed;
+uniform int uPass; /* 0 what covers, 1 what is blended by one share for all colours, 2 what passes of each colour, 3 what is added */
 layout(location = 0) out vec4 oKnown;
 layout(location = 1) out vec4 oSampled;
 
@@ -259,6 +282,14 @@ void main() {
     float co = clamp(dot(facet, wo), 0.0, 1.0);
     vec3 s = l.glossy ? split(l, co) : vec3(0.0);
     float coatAlbedo = l.kind == 1 ? l.coat0 * s.x + l.coat90 * s.y : 0.0;
+    /* What is seen through: the rest of the base. */
+    vec3 through = passing * (1.0 - coatAlbedo) * color;
+    if (m4.y > 0.5) through = mix(vec3(1.0), through, alpha);
+    float cover = 1.0 - luminance(through);
+    if (uPass == 2) {
+        oKnown = oSampled = vec4(through, 1.0 - cover);
+        return;
+    }
     vec3 known = irradiance * l.diffuse * ((1.0 - coatAlbedo) * (1.0 - passing) / PI);
     vec3 sampled = vec3(0.0);
 
@@ -328,13 +359,10 @@ void main() {
     bool emits = luminance(emitted) > 0.0;
     emitted *= uScales.w;
     emitted *= min(1.0, BRIGHTEST / max(max(emitted.r, emitted.g), max(emitted.b, 1e-20)));
-    /* What is seen through: the rest of the base. */
-    float cover = 1.0 - passing * (1.0 - coatAlbedo) * luminance(color);
     if (m4.y > 0.5) {
         known *= alpha;
         sampled *= alpha;
         emitted *= alpha;
-        cover *= alpha;
     }
     if (uCells) {
         vec2 d = abs(fract(around.lattice) - 0.5), w = fwidth(around.lattice);
@@ -343,9 +371,9 @@ void main() {
         float far = max(w.x, w.y);
         known *= mix(1.0, 0.55, clamp(1.0 + line, 0.0, 1.0) * (1.0 - smoothstep(0.3, 0.8, far)));
     }
-    /* The second alpha says what automatic exposure looks at. */
+    /* The second alpha says what automatic exposure looks at; where it is what blends, samples behind need all of it. */
     oKnown = vec4(finite(known * uScales.w + emitted), cover);
-    oSampled = vec4(finite(sampled * uScales.w), lit && !emits ? cover : 0.0);
+    oSampled = vec4(finite(sampled * uScales.w), uPass == 1 || (lit && !emits) ? cover : 0.0);
 }`;
 
 /** What lies behind everything. */

@@ -16,6 +16,8 @@ export interface Pose {
 
 export interface NamedPose extends Pose {
     name: string;
+    /** What the scene's camera is, where that is no perspective. */
+    projection?: string;
 }
 
 /** A scene as `walk.js` decodes it: what the page has to know of it besides geometry and light, which are the renderer's. */
@@ -117,6 +119,8 @@ export interface RendererLike {
     screenshot(): Promise<Blob>;
     resize(): void;
     onframe: ((info: FrameInfo) => void) | null;
+    /** Called where the graphics processor was taken away; the page loads again once it is back. */
+    onlost: (() => void) | null;
     dispose(): void;
 }
 

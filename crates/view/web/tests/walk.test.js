@@ -13,6 +13,7 @@ import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 
 import { browser as start, wait } from "./browser.js";
+import { panesFile, throughPanes, wall } from "./panes.js";
 
 /** @import { Browser, Page } from "puppeteer-core" */
 /** @import { ChildProcess } from "node:child_process" */
@@ -374,6 +375,176 @@ test("a glossy hall is as bright as `render` has it, and false colours fit a sma
     await rested(page);
     await page.screenshot({ path: join(PICTURES, "false-colour.png") });
     assert.ok(await page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is too wide");
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
+
+test("panes behind panes are as bright and as coloured from either side as by hand", { skip }, async () => {
+    writeFileSync(join(folder, "panes.gltf"), panesFile());
+    run("solve", "panes.gltf", "--patches", "2k", "--rays", "20k", "-o", "panes.twin");
+    run("export", "panes.twin", "-o", "panes.html");
+    const { page, complaints } = await open(pathToFileURL(join(folder, "panes.html")).href);
+    for (const camera of ["front", "back"]) {
+        await page.evaluate((name) => {
+            const { camera, walk } = /** @type {any} */ (globalThis).twinray;
+            camera.set(walk.cameras.find((/** @type {any} */ c) => c.name === name));
+        }, camera);
+        const { size, base64 } = await picture(page, { exposure: 0, curve: "none" }, `panes-${camera}`);
+        const [middle, beside] = /** @type {number[][]} */ (
+            await page.evaluate(async () => {
+                const { renderer } = /** @type {any} */ (globalThis).twinray;
+                const { clientWidth: width, clientHeight: height } = renderer.canvas;
+                const places = [0.5, 0.02].map((y) => renderer.pick(0.5 * width, y * height));
+                return (await Promise.all(places)).map((pick) => pick.radiance);
+            })
+        );
+        for (const [found, expected] of [
+            [middle, throughPanes(camera)],
+            [beside, wall(camera)],
+        ]) {
+            const far = found.map((x, k) => Math.abs(x / expected[k] - 1));
+            // Half floats have eleven bits.
+            assert.ok(Math.max(...far) < 0.003, `${camera}: ${found}, by hand ${expected}`);
+        }
+        const how = ["--method", "gather", "--spp", "4", "--exposure", "0", "--tone", "none"];
+        run("render", "panes.twin", ...how, "--camera", camera, "--size", size, "-o", "panes.png");
+        const { ratio } = await compared(base64, readFileSync(join(folder, "panes.png"), "base64"));
+        assert.ok(
+            ratio.every((r) => Math.abs(r - 1) < MEAN),
+            `${camera}: means differ by ${ratio}`,
+        );
+    }
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
+
+/** A page of the panes, from the disk. @param {string} [hash] */
+async function openPanes(hash = "") {
+    const file = join(folder, "window.html");
+    if (!existsSync(file)) {
+        writeFileSync(join(folder, "window.gltf"), panesFile());
+        run("solve", "window.gltf", "--patches", "2k", "--rays", "20k", "-o", "window.twin");
+        run("export", "window.twin", "-o", "window.html");
+    }
+    return open(pathToFileURL(file).href + hash);
+}
+
+/** What the middle of the picture shows, once the view rests. @param {Page} page @returns {Promise<number[]>} */
+async function middle(page) {
+    await rested(page);
+    return /** @type {any} */ (
+        await page.evaluate(async () => {
+            const { renderer } = /** @type {any} */ (globalThis).twinray;
+            const { clientWidth: width, clientHeight: height } = renderer.canvas;
+            return (await renderer.pick(width / 2, height / 2)).radiance;
+        })
+    );
+}
+
+/** @param {number[]} found @param {number[]} expected */
+const isSeen = (found, expected) =>
+    assert.ok(
+        found.every((x, k) => Math.abs(x / expected[k] - 1) < 0.003),
+        `${found}, by hand ${expected}`,
+    );
+
+test("a lost graphics processor is told, and the same view comes back with it", { skip }, async () => {
+    const { page, complaints } = await openPanes();
+    await page.evaluate(() => {
+        const { camera, walk } = /** @type {any} */ (globalThis).twinray;
+        camera.set(walk.cameras[1]);
+    });
+    isSeen(await middle(page), throughPanes("back"));
+    const pose = "JSON.stringify(window.twinray.camera.pose.eye.map((x) => Math.round(1e3 * x)))";
+    const before = await page.evaluate(pose);
+    // Lost in the midst of a movement: its last step is what has to come back.
+    const found = await page.evaluate(async () => {
+        const global = /** @type {any} */ (globalThis);
+        const { renderer, camera } = global.twinray;
+        global.context = renderer.gl.getExtension("WEBGL_lose_context");
+        global.context.loseContext();
+        await new Promise((done) => renderer.canvas.addEventListener("webglcontextlost", done, { once: true }));
+        camera.move([0.25, 0, 0]);
+        renderer.resize();
+        camera.move([-0.25, 0, 0]);
+        await new Promise((done) => setTimeout(done, 300));
+        const refused = await renderer.screenshot().then(
+            () => false,
+            () => true,
+        );
+        return { pick: await renderer.pick(9, 9), refused, resting: renderer.state.resting };
+    });
+    assert.deepEqual(found, { pick: null, refused: true, resting: true });
+    assert.match(String(await page.$eval("#toast", (note) => note.textContent)), /comes back/);
+    await Promise.all([page.waitForNavigation(), page.evaluate("globalThis.context.restoreContext()")]);
+    await page.waitForFunction("window.twinray?.renderer.state.frames > 0", { timeout: 60_000 });
+    assert.equal(await page.evaluate(pose), before);
+    isSeen(await middle(page), throughPanes("back"));
+    // Chromium itself may say that a context was lost.
+    assert.deepEqual(
+        complaints.filter((c) => !/CONTEXT_LOST|context lost/i.test(c)),
+        [],
+    );
+    await page.close();
+});
+
+test("the picture has the pixels of its window, panel and screen, and is right in each", { skip }, async () => {
+    const { page, complaints } = await openPanes();
+    const sizes = async () => {
+        isSeen(await middle(page), throughPanes("front"));
+        return /** @type {any} */ (
+            await page.evaluate(() => {
+                const { canvas } = /** @type {any} */ (globalThis).twinray.renderer;
+                const frame = /** @type {any} */ (globalThis).twinray.camera.aspect;
+                const ratio = Math.min(devicePixelRatio, 2);
+                const fits =
+                    canvas.width === Math.round(canvas.clientWidth * ratio) &&
+                    canvas.height === Math.round(canvas.clientHeight * ratio);
+                const aspect = Math.abs(frame - canvas.clientWidth / canvas.clientHeight) < 1e-9;
+                return { width: canvas.width, height: canvas.height, fits: fits && aspect };
+            })
+        );
+    };
+    const first = await sizes();
+    assert.ok(first.fits);
+    await page.focus("canvas");
+    await page.keyboard.press("p");
+    await page.waitForFunction(`window.twinray.renderer.canvas.width > ${first.width}`);
+    const wide = await sizes();
+    assert.ok(wide.fits && wide.height === first.height, JSON.stringify(wide));
+    await page.setViewport({ width: 600, height: 400 });
+    await page.waitForFunction("window.twinray.renderer.canvas.width <= 600");
+    assert.ok((await sizes()).fits);
+    // As a page is zoomed: without a window, Chromium tells nobody of another ratio alone. More than 2 is not worth its time.
+    for (const [deviceScaleFactor, width, pixels] of [
+        [1.5, 400, 600],
+        [3, 300, 600],
+        [1, 600, 600],
+    ]) {
+        await page.setViewport({ width, height: 400, deviceScaleFactor });
+        await page.waitForFunction(`innerWidth === ${width} && window.twinray.renderer.canvas.width === ${pixels}`);
+        assert.ok((await sizes()).fits);
+    }
+    assert.deepEqual(complaints, []);
+    await page.close();
+});
+
+test("a camera without perspective is seen in one from the same place, which its button says", { skip }, async () => {
+    const { page, complaints } = await openPanes();
+    const button = await page.$eval("#cameras button:nth-of-type(3)", (b) => ({
+        text: b.textContent,
+        title: /** @type {HTMLElement} */ (b).title,
+    }));
+    assert.equal(button.text, "plan (in perspective)");
+    assert.match(button.title, /A parallel projection, shown in perspective from the same place/);
+    assert.equal(await page.$eval("#cameras button", (b) => b.textContent), "front");
+    await page.click("#cameras button:nth-of-type(3)");
+    isSeen(await middle(page), throughPanes("front"));
+    const { eye, fov } = /** @type {any} */ (await page.evaluate("window.twinray.camera.pose"));
+    assert.ok(Math.hypot(eye[0], eye[1], eye[2] - 2) < 1e-6, String(eye));
+    // Half of its height is 1, at a distance of 2.
+    assert.ok(Math.abs(fov - 2 * Math.atan(0.5)) < 1e-6, String(fov));
+    await page.screenshot({ path: join(PICTURES, "plan.png") });
     assert.deepEqual(complaints, []);
     await page.close();
 });

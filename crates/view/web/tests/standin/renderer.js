@@ -71,6 +71,8 @@ export class Renderer {
     };
     /** @type {((info: FrameInfo) => void) | null} */
     onframe = null;
+    /** @type {(() => void) | null} */
+    onlost = null;
     /** For tests: how often it drew. */
     frames = 0;
     #canvas;
