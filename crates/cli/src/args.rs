@@ -59,7 +59,7 @@ pub struct ReadArgs {
 }
 
 /// How a scene is loaded and cut.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct LoadArgs {
     /// A .glb, .gltf or .obj file, the name of a built-in scene, or a .twin file
     #[arg(value_name = "SCENE")]

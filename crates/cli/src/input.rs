@@ -62,6 +62,11 @@ impl Loaded {
         self.source.metres_per_unit
     }
 
+    /// The scene's file, or the name of a built-in one.
+    pub fn scene_file(&self) -> &str {
+        &self.source.file
+    }
+
     /// Where the scene is, as seen from a folder, and how it was cut.
     pub fn source_seen_from(&self, folder: &Path) -> SceneSource {
         let place = |file: &str| stored::seen_from(file, folder);

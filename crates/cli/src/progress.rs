@@ -168,6 +168,7 @@ pub struct FrameProgress {
     start: Instant,
     total: usize,
     done: usize,
+    what: &'static str,
     shown: Shown,
     last_line: f64,
 }
@@ -175,7 +176,12 @@ pub struct FrameProgress {
 impl FrameProgress {
     /// Starts the clock for so many pictures.
     pub fn new(total: usize, quiet: bool) -> Self {
-        Self { start: Instant::now(), total, done: 0, shown: Shown::new(quiet), last_line: 0.0 }
+        Self { start: Instant::now(), total, done: 0, what: "frame", shown: Shown::new(quiet), last_line: 0.0 }
+    }
+
+    /// Counts something else than frames.
+    pub fn counting(self, what: &'static str) -> Self {
+        Self { what, ..self }
     }
 
     /// One more is done.
@@ -196,7 +202,7 @@ impl FrameProgress {
         let share = (self.done as f64 + share_of_next.clamp(0.0, 1.0)) / self.total as f64;
         let left = seconds * (1.0 / share.max(1e-9) - 1.0);
         let left = HumanDuration(Duration::from_secs_f64(left.min(1e9)));
-        self.shown.tell(share, format!("frame {} of {}  {left} left", self.done + 1, self.total));
+        self.shown.tell(share, format!("{} {} of {}  {left} left", self.what, self.done + 1, self.total));
         self.last_line = seconds;
     }
 

@@ -40,7 +40,7 @@ pub use crate::ies::read_ies;
 pub use crate::limits::Limits;
 pub use crate::obj::{ObjFiles, write_obj};
 pub use crate::picture::{PictureFile, read_picture};
-pub use crate::png::write_png;
+pub use crate::png::{write_png, write_png_rgba};
 pub use crate::radiance::read_radiance_map;
 pub use crate::read::{Origin, Reading, Resolver, read_scene};
 pub use crate::twin::{Method, Provenance, SceneSource, SolutionFile, StoredSolution, read_solution, write_solution};

@@ -15,6 +15,14 @@ pub fn write_png(width: u32, height: u32, rgb: &[u8], text: &[(&str, &str)]) -> 
     encode(width, height, rgb, png::ColorType::Rgb, text)
 }
 
+/// As [`write_png`], with an alpha channel: `rgba` is `[height, width, 4]`.
+///
+/// # Panics
+/// If `rgba` has not `4 × width × height` bytes, or width or height is 0 or above 2³¹ − 1.
+pub fn write_png_rgba(width: u32, height: u32, rgba: &[u8], text: &[(&str, &str)]) -> Vec<u8> {
+    encode(width, height, rgba, png::ColorType::Rgba, text)
+}
+
 /// The bytes of an RGBA picture, for textures embedded in scene files.
 pub(crate) fn encode_rgba(width: u32, height: u32, rgba: &[u8]) -> Vec<u8> {
     encode(width, height, rgba, png::ColorType::Rgba, &[])

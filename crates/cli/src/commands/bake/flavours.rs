@@ -1,0 +1,114 @@
+//! Pages as engines want them: what is in the file, what lies beside it, and in which numbers.
+
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use twinray::bake::{Colours, Lightmap, Page};
+use twinray::format::{self, Ktx2Format, Ktx2Packing, LitMaterial, LitPage, LitPicture};
+use twinray::render::ToneCurve;
+use twinray::scene::Rgb;
+
+use crate::args::EngineArg;
+
+/// Share of the texels that the picture of 8 bits may show too dark.
+const CLIPPED: f64 = 1e-3;
+/// Where the mean of logarithms is put on a screen.
+const MIDDLE_GREY: f64 = 0.2;
+const SOFTWARE: [(&str, &str); 1] = [("Software", concat!("twinray ", env!("CARGO_PKG_VERSION")))];
+
+/// Pages for the document, and files beside it.
+pub struct Dressed {
+    pub pages: Vec<LitPage>,
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+}
+
+/// Lightmaps of irradiance for an engine; `output` is the document's place.
+pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
+    let mut dressed = Dressed { pages: Vec::new(), files: Vec::new() };
+    let stem = output.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    for (k, page) in map.pages.iter().enumerate() {
+        let name = format!("lightmap {k}");
+        let (scaled, extension, quantity) = match engine {
+            EngineArg::Three | EngineArg::Unlit => {
+                let material = in_the_file(page, &name);
+                dressed.pages.push(LitPage { name, material });
+                continue;
+            }
+            EngineArg::Bevy => (1.0 / PI, "ktx2", "irradiance/π"),
+            EngineArg::Godot => (1.0, "exr", "irradiance"),
+        };
+        let pixels: Vec<[f32; 3]> =
+            page.irradiance.iter().map(|p| p.map(|c| (f64::from(c) * scaled) as f32)).collect();
+        let bytes = match engine {
+            EngineArg::Bevy => {
+                format::write_ktx2(page.width, page.height, &pixels, Ktx2Format::Rgb9e5, Ktx2Packing::Zstd, &[])
+            }
+            _ => format::write_exr(page.width, page.height, &pixels, Some(1.0), &[("software", SOFTWARE[0].1)]),
+        };
+        let uri = format!("{stem}-{k}.{extension}");
+        let about = json!({ "uri": uri, "page": k, "texCoord": 1, "quantity": quantity });
+        dressed.files.push((output.with_file_name(&uri), bytes));
+        dressed.pages.push(LitPage { name, material: LitMaterial::Beside(about) });
+    }
+    dressed
+}
+
+fn in_the_file(page: &Page, name: &str) -> LitMaterial {
+    // Browsers unpack zlib themselves.
+    let hdr =
+        format::write_ktx2(page.width, page.height, &page.irradiance, Ktx2Format::Rgb9e5, Ktx2Packing::Zlib, &[]);
+    let mut brightest: Vec<f32> =
+        page.irradiance.iter().map(|p| p.iter().copied().fold(0.0, f32::max)).filter(|b| *b > 0.0).collect();
+    brightest.sort_by(f32::total_cmp);
+    let place = ((1.0 - CLIPPED) * brightest.len() as f64) as usize;
+    let intensity = brightest.get(place.min(brightest.len().saturating_sub(1))).copied().unwrap_or(1.0);
+    let rgb: Vec<u8> = page.irradiance.iter().flatten().map(|&c| encoded(f64::from(c / intensity))).collect();
+    let ldr = format::write_png(page.width, page.height, &rgb, &SOFTWARE);
+    LitMaterial::Lightmap {
+        hdr: LitPicture { name: format!("{name} (irradiance)"), bytes: hdr, mime: "image/ktx2" },
+        ldr: LitPicture { name: name.to_owned(), bytes: ldr, mime: "image/png" },
+        intensity,
+    }
+}
+
+/// Colours for viewers without light. `exposure` is in stops; without, the light's own mean becomes a middle grey.
+pub fn unlit(colours: &[Colours], exposure: Option<f64>) -> Vec<LitPage> {
+    let factor = exposure.map_or_else(|| automatic(colours), f64::exp2);
+    let page = |(k, colours): (usize, &Colours)| {
+        let Page { width, height, irradiance: radiance, .. } = &colours.radiance;
+        let rgba: Vec<u8> = radiance
+            .iter()
+            .zip(&colours.presence)
+            .flat_map(|(p, alpha)| {
+                let [r, g, b] = ToneCurve::AgX.shown(Rgb::from_f32(*p) * factor).to_array();
+                [r, g, b, f64::from(*alpha)].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
+            })
+            .collect();
+        let name = format!("light {k}");
+        let bytes = format::write_png_rgba(*width, *height, &rgba, &SOFTWARE);
+        LitPage { name: name.clone(), material: LitMaterial::Unlit(LitPicture { name, bytes, mime: "image/png" }) }
+    };
+    colours.iter().enumerate().map(page).collect()
+}
+
+fn automatic(colours: &[Colours]) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for page in colours {
+        for (p, coverage) in page.radiance.irradiance.iter().zip(&page.radiance.coverage) {
+            let luminance = Rgb::from_f32(*p).luminance();
+            if luminance > 0.0 {
+                sum += f64::from(*coverage) * luminance.log2();
+                total += f64::from(*coverage);
+            }
+        }
+    }
+    if total > 0.0 { MIDDLE_GREY / (sum / total).exp2() } else { 1.0 }
+}
+
+/// Linear light as a byte of sRGB (IEC 61966-2-1).
+fn encoded(c: f64) -> u8 {
+    let c = c.clamp(0.0, 1.0);
+    let e = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    (e * 255.0).round() as u8
+}
