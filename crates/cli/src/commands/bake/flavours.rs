@@ -13,6 +13,8 @@ use crate::args::EngineArg;
 
 /// Share of the texels that the picture of 8 bits may show too dark.
 const CLIPPED: f64 = 1e-3;
+/// Just below what RGB9E5 and half floats can say.
+const LARGEST: f32 = 65_000.0;
 /// Where the mean of logarithms is put on a screen.
 const MIDDLE_GREY: f64 = 0.2;
 const SOFTWARE: [(&str, &str); 1] = [("Software", concat!("twinray ", env!("CARGO_PKG_VERSION")))];
@@ -42,7 +44,7 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
             page.irradiance.iter().map(|p| p.map(|c| (f64::from(c) * scaled) as f32)).collect();
         let bytes = match engine {
             EngineArg::Bevy => {
-                format::write_ktx2(page.width, page.height, &pixels, Ktx2Format::Rgb9e5, Ktx2Packing::Zstd, &[])
+                format::write_ktx2(page.width, page.height, &pixels, Ktx2Format::Rgb9e5, Ktx2Packing::Zstandard)
             }
             _ => format::write_exr(page.width, page.height, &pixels, Some(1.0), &[("software", SOFTWARE[0].1)]),
         };
@@ -55,9 +57,12 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
 }
 
 fn in_the_file(page: &Page, name: &str) -> LitMaterial {
+    // A sunny day has more lux than shared exponents can say.
+    let largest = page.irradiance.iter().flatten().copied().fold(0.0, f32::max);
+    let scale = if largest > LARGEST { (largest / LARGEST).log2().ceil().exp2() } else { 1.0 };
+    let scaled: Vec<[f32; 3]> = page.irradiance.iter().map(|p| p.map(|c| c / scale)).collect();
     // Browsers unpack zlib themselves.
-    let hdr =
-        format::write_ktx2(page.width, page.height, &page.irradiance, Ktx2Format::Rgb9e5, Ktx2Packing::Zlib, &[]);
+    let hdr = format::write_ktx2(page.width, page.height, &scaled, Ktx2Format::Rgb9e5, Ktx2Packing::Zlib);
     let mut brightest: Vec<f32> =
         page.irradiance.iter().map(|p| p.iter().copied().fold(0.0, f32::max)).filter(|b| *b > 0.0).collect();
     brightest.sort_by(f32::total_cmp);
@@ -67,6 +72,7 @@ fn in_the_file(page: &Page, name: &str) -> LitMaterial {
     let ldr = format::write_png(page.width, page.height, &rgb, &SOFTWARE);
     LitMaterial::Lightmap {
         hdr: LitPicture { name: format!("{name} (irradiance)"), bytes: hdr, mime: "image/ktx2" },
+        scale,
         ldr: LitPicture { name: name.to_owned(), bytes: ldr, mime: "image/png" },
         intensity,
     }

@@ -119,7 +119,7 @@ impl Pictures<'_, '_, '_, '_> {
 
 /// A page whose pictures are in the document.
 enum Shown {
-    Lightmap { image: usize, texture: usize, intensity: f32 },
+    Lightmap { image: usize, scale: f32, texture: usize, intensity: f32 },
     Beside(Value),
     Unlit { texture: usize },
 }
@@ -127,8 +127,9 @@ enum Shown {
 impl Shown {
     fn new(material: &LitMaterial, pictures: &mut Pictures<'_, '_, '_, '_>) -> Self {
         match material {
-            LitMaterial::Lightmap { hdr, ldr, intensity } => Self::Lightmap {
+            LitMaterial::Lightmap { hdr, scale, ldr, intensity } => Self::Lightmap {
                 image: pictures.image(hdr),
+                scale: *scale,
                 texture: pictures.texture(ldr),
                 intensity: *intensity,
             },
@@ -139,11 +140,11 @@ impl Shown {
 
     fn put(&self, material: &mut Value, extensions: &mut BTreeSet<&'static str>) {
         match self {
-            Self::Lightmap { image, texture, intensity } => {
+            Self::Lightmap { image, scale, texture, intensity } => {
                 material["extensions"]["MOZ_lightmap"] =
                     json!({ "index": texture, "texCoord": 1, "intensity": intensity });
                 material["extensions"]["TWINRAY_lightmap"] =
-                    json!({ "image": image, "texCoord": 1, "quantity": "irradiance" });
+                    json!({ "image": image, "texCoord": 1, "quantity": "irradiance", "scale": scale });
                 extensions.extend(["MOZ_lightmap", "TWINRAY_lightmap"]);
             }
             Self::Beside(value) => material["extras"]["twinray_lightmap"] = value.clone(),

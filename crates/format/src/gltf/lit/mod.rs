@@ -87,8 +87,10 @@ pub struct LitPage {
 pub enum LitMaterial {
     /// Adds a lightmap of irradiance: `TWINRAY_lightmap`, and `MOZ_lightmap` with a picture of 8 bits for those that know it.
     Lightmap {
-        /// Irradiance, W·m⁻² (or lux).
+        /// Irradiance over `scale`, W·m⁻² (or lux).
         hdr: LitPicture,
+        /// What 1 is in `hdr`.
+        scale: f32,
         /// Irradiance over `intensity`, sRGB-encoded.
         ldr: LitPicture,
         /// What is white in `ldr`.
