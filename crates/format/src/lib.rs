@@ -1,4 +1,4 @@
-//! Bytes to twinray's types and back, for every file kind: glTF 2.0 and OBJ scenes, PNG and EXR pictures.
+//! Bytes to twinray's types and back, for every file kind: glTF 2.0 and OBJ scenes, PNG, EXR and KTX2 pictures.
 //!
 //! Lives here: [`read_scene`] and the writers, one module per file kind, the [`Limits`] hostile bytes run into,
 //! and the two lists a reader answers with, [`FormatError`] and [`Warning`]. Not here: paths and the disk. The
@@ -20,6 +20,7 @@ mod exr;
 mod geometry;
 mod gltf;
 mod ies;
+mod ktx2;
 mod limits;
 mod obj;
 mod picture;
@@ -37,6 +38,7 @@ pub use crate::export::{CellTable, write_csv, write_npz, write_ply, write_vtu};
 pub use crate::exr::{write_exr, write_exr_aovs};
 pub use crate::gltf::{Lit, LitMaterial, LitPage, LitPicture, LitSurface, LitVertex, write_glb, write_lit_glb};
 pub use crate::ies::read_ies;
+pub use crate::ktx2::{Ktx2Format, Ktx2Packing, write_ktx2};
 pub use crate::limits::Limits;
 pub use crate::obj::{ObjFiles, write_obj};
 pub use crate::picture::{PictureFile, read_picture};

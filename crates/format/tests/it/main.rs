@@ -9,6 +9,7 @@ mod gltf_lights;
 mod gltf_material;
 mod gltf_nodes;
 mod ies;
+mod ktx2;
 mod limits;
 mod mutation;
 mod obj;
