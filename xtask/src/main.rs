@@ -31,6 +31,7 @@ const STEPS: &[Step] = &[
         "the walk-through's page: format, types, tests in a browser; Node and Chromium are installed where missing",
         web,
     ),
+    ("three", "baked light as three.js shows it in a browser, which is installed where missing", three),
 ];
 
 /// Not a part of `ci`: it takes minutes, and its comparisons are tests of `crates/validate` already.
@@ -124,6 +125,10 @@ fn mpi() -> Result<(), String> {
 
 fn web() -> Result<(), String> {
     run(Command::new("bash").arg("crates/view/web/check.sh").current_dir(structure::root()))
+}
+
+fn three() -> Result<(), String> {
+    run(Command::new("bash").arg("engines/three/check.sh").current_dir(structure::root()))
 }
 
 fn deps() -> Result<(), String> {

@@ -116,7 +116,12 @@ impl Atlas {
     ///
     /// # Errors
     /// If there is no part, a density is no number, or the unwrapper gives up.
-    pub fn new(scene: &Scene, patches: &PatchScene, parts: &[Part], options: &AtlasOptions) -> Result<Self, AtlasError> {
+    pub fn new(
+        scene: &Scene,
+        patches: &PatchScene,
+        parts: &[Part],
+        options: &AtlasOptions,
+    ) -> Result<Self, AtlasError> {
         if parts.is_empty() {
             return Err(AtlasError::Nothing);
         }
@@ -261,7 +266,8 @@ fn unwrap(
         meshes.push(MeshInput::new(&dark_corner, &[0, 1, 2, 0, 2, 3]));
     }
     let page_size = options.page_size;
-    let base = Options { padding: options.padding, max_chart_size: page_size - 2 * options.padding, ..Options::default() };
+    let base =
+        Options { padding: options.padding, max_chart_size: page_size - 2 * options.padding, ..Options::default() };
     let fixed = |page_size| match options.density {
         TexelDensity::OnePage => Density::Auto { page_size: options.page_size },
         TexelDensity::PerMetre(d) => Density::Fixed { texels_per_unit: d as f32, page_size },
@@ -317,9 +323,8 @@ fn unwrap(
 /// The chart of the dark: its page and corners.
 fn dark_place(found: &uvunwrap::Atlas) -> (u32, [[f32; 2]; 2]) {
     let vertices = found.meshes.last().map_or(&[][..], |m| &m.vertices);
-    let bound = |pick: fn(f32, f32) -> f32| {
-        [0, 1].map(|axis| vertices.iter().map(|v| v.uv[axis]).reduce(pick).unwrap_or(0.0))
-    };
+    let bound =
+        |pick: fn(f32, f32) -> f32| [0, 1].map(|axis| vertices.iter().map(|v| v.uv[axis]).reduce(pick).unwrap_or(0.0));
     (vertices.iter().find_map(|v| v.page).unwrap_or(0), [bound(f32::min), bound(f32::max)])
 }
 

@@ -39,7 +39,8 @@ pub fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 
 /// Columns and rows of the texels that a triangle, in texels, may cover a piece of.
 pub fn range(triangle: [[f64; 2]; 3], size: [u32; 2]) -> [Range<u32>; 2] {
-    let bound = |axis: usize, pick: fn(f64, f64) -> f64| triangle.map(|p| p[axis]).into_iter().reduce(pick).unwrap_or(0.0);
+    let bound =
+        |axis: usize, pick: fn(f64, f64) -> f64| triangle.map(|p| p[axis]).into_iter().reduce(pick).unwrap_or(0.0);
     [0, 1].map(|axis| {
         let low = bound(axis, f64::min).floor().clamp(0.0, f64::from(size[axis]));
         let high = bound(axis, f64::max).ceil().clamp(0.0, f64::from(size[axis]));
@@ -49,7 +50,11 @@ pub fn range(triangle: [[f64; 2]; 3], size: [u32; 2]) -> [Range<u32>; 2] {
 
 /// Calls `each` with every texel of some columns and rows that a triangle, in texels, covers a piece of: its column and
 /// row, and the piece's corners.
-pub fn texels_of(triangle: [[f64; 2]; 3], [columns, rows]: [Range<u32>; 2], mut each: impl FnMut(u32, u32, &[[f64; 2]])) {
+pub fn texels_of(
+    triangle: [[f64; 2]; 3],
+    [columns, rows]: [Range<u32>; 2],
+    mut each: impl FnMut(u32, u32, &[[f64; 2]]),
+) {
     for y in rows {
         for x in columns.clone() {
             let (polygon, count) = clip(triangle, f64::from(x), f64::from(y));

@@ -21,12 +21,12 @@ mod vertices;
 mod watch;
 
 pub use atlas::{Atlas, AtlasError, AtlasOptions, LaidPart, LaidVertex, Layout, TexelDensity};
+pub use colours::{Colours, colours};
 pub use light::{Quality, SurfaceLight};
 pub use lightmap::{Lightmap, LightmapOptions, bake};
 pub use page::Page;
 pub use parts::{Face, Part, parts};
 pub use seams::SeamJump;
-pub use colours::{Colours, colours};
 pub use texels::PagePoint;
 pub use vertices::{VertexLight, bake_vertices};
 pub use watch::{Cancelled, Stage, Watch};

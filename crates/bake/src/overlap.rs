@@ -38,7 +38,11 @@ pub fn authored(mesh: &Mesh, corners: [u32; 3]) -> Option<[[f32; 2]; 3]> {
 }
 
 /// Judges the second texture coordinates of several parts that are to share one page of `size` texels a side.
-pub fn judge<'a>(parts: impl Iterator<Item = (&'a Part, &'a Mesh)>, area: impl Fn(u32) -> f64, size: u32) -> Option<Fault> {
+pub fn judge<'a>(
+    parts: impl Iterator<Item = (&'a Part, &'a Mesh)>,
+    area: impl Fn(u32) -> f64,
+    size: u32,
+) -> Option<Fault> {
     let mut covered = vec![0.0f32; size as usize * size as usize];
     let (mut flat, mut total, mut on_page) = (0.0, 0.0, 0.0);
     for (part, mesh) in parts {

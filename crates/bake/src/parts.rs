@@ -61,18 +61,18 @@ impl Part {
 pub fn parts(scene: &Scene, patches: &PatchScene, solution: &Solution) -> Vec<Part> {
     let sources = sources(scene);
     let mut found = Vec::new();
-    for triangles in (0..sources.len() as u32).collect::<Vec<_>>().chunk_by(|&a, &b| {
-        sources[a as usize].instance == sources[b as usize].instance
-    }) {
+    for triangles in (0..sources.len() as u32)
+        .collect::<Vec<_>>()
+        .chunk_by(|&a, &b| sources[a as usize].instance == sources[b as usize].instance)
+    {
         let source = sources[triangles[0] as usize];
         let instance = source.instance as usize;
         if !is_diffuse(patches, triangles) {
             continue;
         }
         let mesh = &scene.meshes[scene.instances[instance].mesh];
-        let light = |side: Side| -> Vec<[f64; 2]> {
-            triangles.iter().map(|&t| arriving(patches, solution, t, side)).collect()
-        };
+        let light =
+            |side: Side| -> Vec<[f64; 2]> { triangles.iter().map(|&t| arriving(patches, solution, t, side)).collect() };
         let [front, back] = [light(Side::Front), light(Side::Back)];
         let power = |light: &[[f64; 2]]| light.iter().map(|l| l[0]).sum::<f64>();
         let two = power(&back) > LIT_BACK * (power(&front) + power(&back));

@@ -85,10 +85,13 @@ impl Seams {
                         length: points[a].distance(points[b]),
                     };
                     let id = [key(points[a]), key(points[b])];
-                    edges.entry(id).or_insert_with(|| {
-                        order.push(id);
-                        Vec::new()
-                    }).push(side);
+                    edges
+                        .entry(id)
+                        .or_insert_with(|| {
+                            order.push(id);
+                            Vec::new()
+                        })
+                        .push(side);
                 }
             }
         }

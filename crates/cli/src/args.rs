@@ -501,7 +501,11 @@ pub enum QualityArg {
 
 fn density(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "expected a number of texels per metre, such as 20".to_owned())?;
-    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("expected a positive number of texels per metre".into()) }
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err("expected a positive number of texels per metre".into())
+    }
 }
 
 /// `twinray view`.

@@ -26,5 +26,5 @@ pub use display::{Exposure, PhysicalCamera, ToneCurve, WhiteBalance};
 pub use film::Crop;
 pub use gather::{Gather, GatherOptions, IrradianceGather};
 pub use image::Image;
-pub use reconstruct::{Reconstruction, Smooth, Surfaces};
 pub use picture::{Lobes, Picture, PictureOptions, render};
+pub use reconstruct::{Reconstruction, Smooth, Surfaces};

@@ -44,7 +44,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         map.atlas.texels_per_metre,
     );
     let [before, after] = map.seams;
-    println!("{:.1} m of seams jump by {:.2} %, stitched by {:.2} %", before.length, 100.0 * before.rms, 100.0 * after.rms);
+    println!(
+        "{:.1} m of seams jump by {:.2} %, stitched by {:.2} %",
+        before.length,
+        100.0 * before.rms,
+        100.0 * after.rms
+    );
     let mut files = BTreeMap::new();
     for (k, page) in map.pages.iter().enumerate() {
         files.insert(format!("lightmap-{k}.exr"), write_exr(page.width, page.height, &page.irradiance, None, &[]));

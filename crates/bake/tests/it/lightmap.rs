@@ -55,7 +55,8 @@ fn a_furnace_is_even_to_the_rims_of_charts() {
     let scene = builtin::furnace(0.5, 1.0);
     let patches = cut(&scene, f64::INFINITY);
     let solution = solve(&patches, 400_000);
-    let map = bake(&scene, &patches, &solution, &options(20.0, Quality::Cells), &mut |_, _| Ok(())).expect("a lightmap");
+    let map =
+        bake(&scene, &patches, &solution, &options(20.0, Quality::Cells), &mut |_, _| Ok(())).expect("a lightmap");
     let expected = solution.irradiance(patches.patches().next().expect("a patch")).luminance();
     for (p, part) in map.parts.iter().enumerate() {
         for f in 0..part.faces.len() {
@@ -147,7 +148,8 @@ fn tiles_meet_without_a_line() {
     let solution = solve(&patches, 4_000_000);
     let loose = LightmapOptions { stitch: false, ..options(16.0, Quality::Smooth) };
     let map = bake(&wall.0, &patches, &solution, &loose, &mut |_, _| Ok(())).expect("a lightmap");
-    let stitched = bake(&wall.0, &patches, &solution, &options(16.0, Quality::Smooth), &mut |_, _| Ok(())).expect("a lightmap");
+    let stitched =
+        bake(&wall.0, &patches, &solution, &options(16.0, Quality::Smooth), &mut |_, _| Ok(())).expect("a lightmap");
     assert!(map.seams[0].length > 10.0, "{:?}", map.seams);
     assert_eq!(map.seams[0], stitched.seams[0]);
     assert!(stitched.seams[1].rms < 0.003 && stitched.seams[1].p99 < 0.01, "{:?}", stitched.seams);
@@ -170,7 +172,8 @@ fn sheets_have_two_sides() {
     scene.add([-0.5, -0.5, -3.0], [0.5, 0.5, -2.9], lamp, false);
     let patches = cut(&scene.0, 0.1);
     let solution = solve(&patches, 2_000_000);
-    let map = bake(&scene.0, &patches, &solution, &options(10.0, Quality::Smooth), &mut |_, _| Ok(())).expect("a lightmap");
+    let map =
+        bake(&scene.0, &patches, &solution, &options(10.0, Quality::Smooth), &mut |_, _| Ok(())).expect("a lightmap");
     let mean = |side: Side| {
         let part = map.parts.iter().position(|p| p.instance == 0 && p.side == side).expect("a side");
         assert!(map.parts[part].one_sided);
@@ -188,7 +191,9 @@ fn authored_coordinates_are_kept_if_they_are_sound() {
     let mut scene = builtin::cornell(false);
     let patches = cut(&scene, 0.2);
     let solution = solve(&patches, 100_000);
-    let atlas_of = |scene: &Scene| bake(scene, &patches, &solution, &options(10.0, Quality::Cells), &mut |_, _| Ok(())).expect("a lightmap").atlas;
+    let atlas_of = |scene: &Scene| {
+        bake(scene, &patches, &solution, &options(10.0, Quality::Cells), &mut |_, _| Ok(())).expect("a lightmap").atlas
+    };
     // Coordinates of a bake are sound.
     let mut single = options(10.0, Quality::Cells);
     single.atlas.page_size = 1024;
@@ -226,7 +231,8 @@ fn mirrored_instances_are_drawn_from_their_front() {
     scene.add([0.0, 3.0, 0.0], [1.0, 3.1, 1.0], lamp, false);
     let patches = cut(&scene.0, 0.2);
     let solution = solve(&patches, 200_000);
-    let map = bake(&scene.0, &patches, &solution, &options(10.0, Quality::Cells), &mut |_, _| Ok(())).expect("a lightmap");
+    let map =
+        bake(&scene.0, &patches, &solution, &options(10.0, Quality::Cells), &mut |_, _| Ok(())).expect("a lightmap");
     let part = map.parts.iter().find(|p| p.instance == 0).expect("the box");
     assert!(part.mirrored);
     for (face, original) in part.faces.iter().zip(&scene.0.meshes[0].triangles) {

@@ -1,9 +1,7 @@
 //! Scenes and solutions for the tests.
 
 use glam::{DAffine3, DVec3};
-use twinray_scene::{
-    Instance, Material, Mesh, PatchBudget, PatchOptions, PatchScene, Rgb, Scene, Surface, Texel,
-};
+use twinray_scene::{Instance, Material, Mesh, PatchBudget, PatchOptions, PatchScene, Rgb, Scene, Surface, Texel};
 use twinray_solve::{Params, Solution, Solver};
 
 /// A scene of plain boxes.

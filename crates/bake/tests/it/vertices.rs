@@ -1,7 +1,7 @@
 //! Light at vertices.
 
-use twinray_bake::{Quality, bake_vertices};
 use crate::scenes::{Boxes, cut, solve};
+use twinray_bake::{Quality, bake_vertices};
 
 /// Values at vertices have the power of the solution, and are nowhere negative.
 #[test]

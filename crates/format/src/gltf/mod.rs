@@ -54,10 +54,7 @@ const UNDERSTOOD: [&str; 11] = [
 const MESH_BYTES: u64 = 2 * size_of::<Mesh>() as u64;
 
 /// Reads a `.glb` or `.gltf` file; says for each instance where it is in it.
-pub(crate) fn read(
-    context: &mut Context<'_>,
-    bytes: &[u8],
-) -> Result<(Scene, Vec<Option<Origin>>), FormatError> {
+pub(crate) fn read(context: &mut Context<'_>, bytes: &[u8]) -> Result<(Scene, Vec<Option<Origin>>), FormatError> {
     let (text, chunk) = container::split(context.file, bytes)?;
     let (document, tree_bytes) = json::parse(context, text)?;
     let root = Element::root(context.file, &document);

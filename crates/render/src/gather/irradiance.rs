@@ -49,7 +49,8 @@ impl<'a> IrradianceGather<'a> {
             let u = numbers.pair();
             if let Some(g) = self.estimator.gather(&point, u, shadows, &mut numbers) {
                 let scattered = g.scattered.map_or(Rgb::BLACK, |s| s.0);
-                sum += brdf.eval(g.direction) * (normal.dot(g.direction) / g.density) * (g.emitted + scattered + g.other);
+                sum +=
+                    brdf.eval(g.direction) * (normal.dot(g.direction) / g.density) * (g.emitted + scattered + g.other);
             }
         }
         sum * (std::f64::consts::PI / f64::from(rays.max(1)))

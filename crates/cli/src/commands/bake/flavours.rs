@@ -40,8 +40,7 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
             EngineArg::Bevy => (1.0 / PI, "ktx2", "irradiance/π"),
             EngineArg::Godot => (1.0, "exr", "irradiance"),
         };
-        let pixels: Vec<[f32; 3]> =
-            page.irradiance.iter().map(|p| p.map(|c| (f64::from(c) * scaled) as f32)).collect();
+        let pixels: Vec<[f32; 3]> = page.irradiance.iter().map(|p| p.map(|c| (f64::from(c) * scaled) as f32)).collect();
         let bytes = match engine {
             EngineArg::Bevy => {
                 format::write_ktx2(page.width, page.height, &pixels, Ktx2Format::Rgb9e5, Ktx2Packing::Zstandard)

@@ -74,12 +74,14 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     })?;
     let left_out = baked.surfaces.iter().filter(|s| document.origins[s.instance].is_none()).count();
     if left_out > 0 {
-        let warning = format!("{name}: {left_out} surfaces that a transform squashes flat keep their look, without light");
+        let warning =
+            format!("{name}: {left_out} surfaces that a transform squashes flat keep their look, without light");
         commands::print_warnings(std::slice::from_ref(&warning), args.load.quiet);
         loaded.warnings.push(warning);
     }
     let about = about(&scene, &loaded, &solution, settings, &baked);
-    let lit = Lit { surfaces: baked.surfaces, pages: baked.pages, drop_lights: !args.keep_lights, about: about.clone() };
+    let lit =
+        Lit { surfaces: baked.surfaces, pages: baked.pages, drop_lights: !args.keep_lights, about: about.clone() };
     let bytes = document.lit(&lit, &args.load.read)?;
     for (path, bytes) in &baked.files {
         Output::open(path)?.write(bytes)?;
@@ -88,7 +90,8 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
 
     if !args.load.quiet {
         baked.words.iter().for_each(|line| crate::say!("{line}"));
-        let beside = if baked.files.is_empty() { String::new() } else { format!(" and {} files beside it", baked.files.len()) };
+        let beside =
+            if baked.files.is_empty() { String::new() } else { format!(" and {} files beside it", baked.files.len()) };
         crate::say!(
             "{}: {:.2} MB{beside}, {} rays, estimated error {:.2} %, {:.1} s to solve and {:.1} s to bake",
             path.display(),
@@ -118,8 +121,12 @@ fn check(args: &BakeArgs, carrier: CarrierArg, path: &Path) -> anyhow::Result<()
     if extension(path) != "glb" {
         bail!("{}: expected a name that ends in .glb", path.display());
     }
-    if stored::is_solution(name) && (args.solve.rays.is_some() || args.solve.time.is_some() || args.solve.error.is_some()) {
-        bail!("{name}: is solved already, so --rays, --time and --error are not for it: `twinray solve {name}` makes it better");
+    if stored::is_solution(name)
+        && (args.solve.rays.is_some() || args.solve.time.is_some() || args.solve.error.is_some())
+    {
+        bail!(
+            "{name}: is solved already, so --rays, --time and --error are not for it: `twinray solve {name}` makes it better"
+        );
     }
     if carrier == CarrierArg::Vertex && args.engine == Some(EngineArg::Unlit) {
         bail!("--to vertex --for unlit: colours as they look need textures: leave one of the two out");
@@ -157,7 +164,8 @@ fn with_cells(args: &BakeArgs) -> anyhow::Result<Option<crate::args::LoadArgs>> 
 fn area(scene: &Scene) -> f64 {
     let placed = scene.instances.iter().map(|instance| {
         let mesh = &scene.meshes[instance.mesh];
-        let point = |k: u32| instance.transform.transform_point3(glam::Vec3::from(mesh.positions[k as usize]).as_dvec3());
+        let point =
+            |k: u32| instance.transform.transform_point3(glam::Vec3::from(mesh.positions[k as usize]).as_dvec3());
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(point);
             0.5 * (b - a).cross(c - a).length()

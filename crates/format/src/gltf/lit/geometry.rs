@@ -124,7 +124,8 @@ impl<'v, 'b> Geometry<'v, 'b> {
         for primitive in primitives {
             let Some(colour) = primitive["attributes"].get_mut("COLOR_0") else { continue };
             let Some(list) = colour.get("twinray_colour").and_then(Value::as_array) else { continue };
-            let unit = |v: &Value| (v.as_f64().unwrap_or(0.0) / f64::from(scale.max(f32::MIN_POSITIVE))).clamp(0.0, 1.0);
+            let unit =
+                |v: &Value| (v.as_f64().unwrap_or(0.0) / f64::from(scale.max(f32::MIN_POSITIVE))).clamp(0.0, 1.0);
             let bytes: Vec<u8> = list
                 .iter()
                 .flat_map(|c| [unit(&c[0]), unit(&c[1]), unit(&c[2]), 1.0])
