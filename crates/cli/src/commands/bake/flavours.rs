@@ -15,8 +15,6 @@ use crate::args::EngineArg;
 const CLIPPED: f64 = 1e-3;
 /// Just below what RGB9E5 and half floats can say.
 const LARGEST: f32 = 65_000.0;
-/// Where the mean of logarithms is put on a screen.
-const MIDDLE_GREY: f64 = 0.2;
 const SOFTWARE: [(&str, &str); 1] = [("Software", concat!("twinray ", env!("CARGO_PKG_VERSION")))];
 
 /// Pages for the document, and files beside it.
@@ -77,16 +75,15 @@ fn in_the_file(page: &Page, name: &str) -> LitMaterial {
     }
 }
 
-/// Colours for viewers without light. `exposure` is in stops; without, the light's own mean becomes a middle grey.
-pub fn unlit(colours: &[Colours], exposure: Option<f64>) -> Vec<LitPage> {
-    let factor = exposure.map_or_else(|| automatic(colours), f64::exp2);
+/// Colours for viewers without light, multiplied by `exposure`.
+pub fn unlit(colours: &[Colours], exposure: f64) -> Vec<LitPage> {
     let page = |(k, colours): (usize, &Colours)| {
         let Page { width, height, irradiance: radiance, .. } = &colours.radiance;
         let rgba: Vec<u8> = radiance
             .iter()
             .zip(&colours.presence)
             .flat_map(|(p, alpha)| {
-                let [r, g, b] = ToneCurve::AgX.shown(Rgb::from_f32(*p) * factor).to_array();
+                let [r, g, b] = ToneCurve::AgX.shown(Rgb::from_f32(*p) * exposure).to_array();
                 [r, g, b, f64::from(*alpha)].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
             })
             .collect();
@@ -95,20 +92,6 @@ pub fn unlit(colours: &[Colours], exposure: Option<f64>) -> Vec<LitPage> {
         LitPage { name: name.clone(), material: LitMaterial::Unlit(LitPicture { name, bytes, mime: "image/png" }) }
     };
     colours.iter().enumerate().map(page).collect()
-}
-
-fn automatic(colours: &[Colours]) -> f64 {
-    let (mut sum, mut total) = (0.0, 0.0);
-    for page in colours {
-        for (p, coverage) in page.radiance.irradiance.iter().zip(&page.radiance.coverage) {
-            let luminance = Rgb::from_f32(*p).luminance();
-            if luminance > 0.0 {
-                sum += f64::from(*coverage) * luminance.log2();
-                total += f64::from(*coverage);
-            }
-        }
-    }
-    if total > 0.0 { MIDDLE_GREY / (sum / total).exp2() } else { 1.0 }
 }
 
 /// Linear light as a byte of sRGB (IEC 61966-2-1).

@@ -13,6 +13,7 @@ use twinray::bake::{
     VertexLight,
 };
 use twinray::format::{Lit, LitPage, LitSurface, LitVertex};
+use twinray::render::{Exposure, PictureOptions, render};
 use twinray::scene::{Rgb, Scene, Side};
 use twinray::solve::Solution;
 
@@ -223,7 +224,7 @@ fn bake(
             let mut baked = of_lightmap(&map);
             if engine == EngineArg::Unlit {
                 let colours = bake::colours(&loaded.patches, &map, args.padding, &mut watch)?;
-                baked.pages = flavours::unlit(&colours, args.exposure);
+                baked.pages = flavours::unlit(&colours, exposure(args, loaded, solution));
             } else {
                 let dressed = flavours::lightmaps(&map, engine, path);
                 (baked.pages, baked.files) = (dressed.pages, dressed.files);
@@ -233,6 +234,14 @@ fn bake(
     };
     progress.finish();
     Ok(baked)
+}
+
+/// The factor of pictures: what `--exposure` says, or that of a picture from the scene's first camera.
+fn exposure(args: &BakeArgs, loaded: &Loaded, solution: &Solution) -> f64 {
+    let exposure = args.exposure.map_or(Exposure::Auto, Exposure::Stops);
+    let options = PictureOptions { width: 64, height: 48, ..PictureOptions::default() };
+    let seen = loaded.cameras.first().map(|camera| render(&loaded.patches, solution, camera, &options));
+    seen.map_or(1.0, |picture| exposure.factor(&picture))
 }
 
 fn of_lightmap(map: &Lightmap) -> Baked {
