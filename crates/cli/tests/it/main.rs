@@ -3,6 +3,7 @@
 //! Sizes are small: 2000 patches, 100 000 rays, 64 × 48 pixels.
 
 mod accuracy;
+mod bake;
 mod built_in;
 mod compare;
 mod completion;

@@ -1,0 +1,159 @@
+//! `bake`: from a scene to the same scene with its light in it.
+
+use serde_json::Value;
+use twinray::format::{Limits, Reading, read_scene};
+
+use crate::support::Place;
+
+const TINY: [&str; 4] = ["--patches", "1000", "--rays", "100000"];
+
+/// Bakes with the given options and gives the place and the report.
+fn bake(scene: &str, args: &[&str]) -> (Place, Value) {
+    let place = Place::new();
+    let report = place.done(&[&["bake", scene, "-o", "lit.glb", "--json"], &TINY[..], args].concat()).json();
+    (place, report)
+}
+
+fn reading(place: &Place, name: &str) -> Reading {
+    let mut none = |_: &str| Err(std::io::ErrorKind::NotFound.into());
+    read_scene(name, &place.read(name), &mut none, &Limits::default()).unwrap()
+}
+
+/// The JSON chunk of a binary file.
+fn document(place: &Place, name: &str) -> Value {
+    let bytes = place.read(name);
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+}
+
+/// Triangles of a scene in the world, as a multiset of rounded corners.
+fn triangles(reading: &Reading) -> Vec<[[i64; 3]; 3]> {
+    let scene = &reading.scene;
+    let mut found: Vec<[[i64; 3]; 3]> = Vec::new();
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh];
+        for t in &mesh.triangles {
+            let corner = |k: u32| {
+                let p = instance.transform.transform_point3(glam::Vec3::from(mesh.positions[k as usize]).as_dvec3());
+                (p * 1e4).round().to_array().map(|c| c as i64)
+            };
+            let mut corners = t.map(corner);
+            // Rotations are the same triangle, mirror images are not.
+            let least = (0..3).min_by_key(|&k| corners[k]).unwrap();
+            corners.rotate_left(least);
+            found.push(corners);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Nothing of the geometry changes; every surface has a place on the page, and materials know their light.
+#[test]
+fn a_lit_scene_is_the_scene() {
+    let (place, report) = bake("cornell", &["--page-size", "256"]);
+    assert_eq!(place.files(), ["lit.glb"]);
+    place.done(&["scene", "cornell", "-o", "plain.glb"]);
+    let (lit, plain) = (reading(&place, "lit.glb"), reading(&place, "plain.glb"));
+    assert_eq!(triangles(&lit), triangles(&plain));
+    for mesh in &lit.scene.meshes {
+        let uv = mesh.second_texcoords.as_ref().expect("a place on the page");
+        assert!(uv.iter().flatten().all(|c| (0.0..=1.0).contains(c)));
+    }
+    let document = document(&place, "lit.glb");
+    for extension in ["TWINRAY_lightmap", "MOZ_lightmap"] {
+        assert!(document["extensionsUsed"].as_array().unwrap().iter().any(|e| e == extension));
+        let materials = document["materials"].as_array().unwrap();
+        assert!(materials.iter().any(|m| m["extensions"][extension].is_object()));
+    }
+    assert_eq!(document["asset"]["extras"]["twinray_bake"], report["bake"]);
+    assert_eq!(report["bake"]["layout"]["texcoords"], "unwrapped");
+}
+
+/// What was baked can be baked again, with the coordinates that it has then.
+#[test]
+fn a_lit_scene_keeps_its_page() {
+    let (place, _) = bake("cornell", &["--page-size", "256"]);
+    let report = place
+        .done(&[&["bake", "lit.glb", "-o", "again.glb", "--json", "--page-size", "256"], &TINY[..]].concat())
+        .json();
+    assert_eq!(report["bake"]["layout"]["texcoords"], "authored", "{report:#}");
+    assert_eq!(triangles(&reading(&place, "lit.glb")), triangles(&reading(&place, "again.glb")));
+}
+
+/// Every engine and carrier gives its kind of file.
+#[test]
+fn engines_get_what_they_load() {
+    let (place, _) = bake("doorway", &["--for", "unlit", "--page-size", "256"]);
+    let unlit = document(&place, "lit.glb");
+    assert!(unlit["materials"].as_array().unwrap().iter().any(|m| m["extensions"]["KHR_materials_unlit"].is_object()));
+
+    for (engine, extension) in [("bevy", "ktx2"), ("godot", "exr")] {
+        let (place, report) = bake("doorway", &["--for", engine, "--page-size", "256"]);
+        let uri = format!("lit-0.{extension}");
+        let mut files = place.files();
+        files.sort();
+        assert_eq!(files, [uri.clone(), "lit.glb".into()]);
+        assert_eq!(report["files"][0], uri.as_str());
+        let document = document(&place, "lit.glb");
+        let named = |m: &Value| m["extras"]["twinray_lightmap"]["uri"] == uri.as_str();
+        assert!(document["materials"].as_array().unwrap().iter().any(named));
+    }
+
+    let (place, _) = bake("doorway", &["--to", "vertex"]);
+    let vertex = document(&place, "lit.glb");
+    let primitive = &vertex["meshes"][0]["primitives"][0];
+    assert!(primitive["attributes"]["_IRRADIANCE"].is_u64() && primitive["attributes"]["COLOR_0"].is_u64());
+    assert!(vertex["meshes"][0]["extras"]["twinray_irradiance_scale"].as_f64().unwrap() > 0.0);
+}
+
+/// Lights that are baked leave the file unless they are to stay.
+#[test]
+fn baked_lights_leave() {
+    let lamp = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+        "extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":100.0,"name":"lamp"}]}},
+        "nodes":[{"mesh":0,"name":"floor"},{"translation":[0,1,0],"name":"lamp","extensions":{"KHR_lights_punctual":{"light":0}}}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[-1,0,-1],"max":[1,0,1]}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"floor.bin"}]}"#;
+    let place = Place::new();
+    place.write("lamp.gltf", lamp);
+    let corners: [[f32; 3]; 3] = [[-1.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
+    place.write("floor.bin", corners.iter().flatten().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>());
+    let args = [&["bake", "lamp.gltf", "-o", "lit.glb", "--json"], &TINY[..]].concat();
+    let report = place.done(&args).json();
+    let dark = document(&place, "lit.glb");
+    assert_eq!(report["bake"]["lights"]["punctual"][0], "lamp");
+    assert!(dark["extensions"]["KHR_lights_punctual"].is_null());
+    assert_eq!(dark["nodes"][1]["name"], "lamp");
+    assert!(dark["buffers"][0]["uri"].is_null());
+    place.done(&[&args[..], &["--keep-lights"]].concat());
+    assert_eq!(document(&place, "lit.glb")["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"], 0);
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let args = ["--quality", "high", "--texel-rays", "4", "--page-size", "128"];
+    let [one, three] =
+        ["1", "3"].map(|threads| bake("doorway", &[&args[..], &["--threads", threads]].concat()).0.read("lit.glb"));
+    assert!(one == three);
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let place = Place::new();
+    for (args, expected) in [
+        (&["bake", "cornell", "-o", "lit.png"][..], ".glb"),
+        (&["bake", "cornell", "--density", "0"], "texels per metre"),
+        (&["bake", "cornell", "--exposure", "1"], "--for unlit"),
+        (&["bake", "cornell", "--to", "vertex", "--for", "unlit"], "leave one"),
+        (&["bake", "no-such.glb"], "no such file"),
+    ] {
+        let run = place.run(args);
+        assert_eq!(run.code, Some(2), "{args:?}");
+        assert!(run.stderr.contains(expected), "{args:?}: {}", run.stderr);
+    }
+    assert!(place.files().is_empty());
+}
