@@ -114,7 +114,8 @@ fn baked_lights_leave() {
         "extensionsUsed":["KHR_lights_punctual"],
         "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":100.0,"name":"lamp"}]}},
         "nodes":[{"mesh":0,"name":"floor"},{"translation":[0,1,0],"name":"lamp","extensions":{"KHR_lights_punctual":{"light":0}}}],
-        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+        "materials":[{"name":"grey","pbrMetallicRoughness":{"metallicFactor":0.0,"baseColorFactor":[0.5,0.5,0.5,1]}}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[-1,0,-1],"max":[1,0,1]}],
         "bufferViews":[{"buffer":0,"byteLength":36}],
         "buffers":[{"byteLength":36,"uri":"floor.bin"}]}"#;
