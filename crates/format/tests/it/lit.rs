@@ -32,7 +32,7 @@ impl Glb {
             assert_eq!(&rest[4..], b"BIN\0");
             assert_eq!(28 + length + word(20 + length), bytes.len());
         }
-        assert!(length % 4 == 0 && bytes.len() % 4 == 0, "chunks end at multiples of four bytes");
+        assert!(length.is_multiple_of(4) && bytes.len().is_multiple_of(4), "chunks end at multiples of four bytes");
         let json = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
         let binary = bytes.get(28 + length..).unwrap_or_default().to_vec();
         Self { json, binary }

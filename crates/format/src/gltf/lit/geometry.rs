@@ -173,7 +173,8 @@ impl<'v, 'b> Geometry<'v, 'b> {
         }
         let bounds = (key == "POSITION").then(|| bounds(&bytes, stride, component));
         let mut view = json!({ "target": 34962 });
-        if stride != size {
+        // What the last column of a matrix is filled up with is not everybody's part of it.
+        if stride != size || kind.starts_with("MAT") {
             view["byteStride"] = json!(stride);
         }
         let view = self.view(view, bytes);

@@ -28,7 +28,7 @@ pub(super) fn walk_accessors(document: &mut Value, each: &mut dyn FnMut(&mut Val
     fn list<'a>(value: &'a mut Value, key: &str) -> impl Iterator<Item = &'a mut Value> {
         value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
     }
-    fn members<'a>(value: Option<&'a mut Value>) -> impl Iterator<Item = &'a mut Value> {
+    fn members(value: Option<&mut Value>) -> impl Iterator<Item = &mut Value> {
         value.and_then(Value::as_object_mut).into_iter().flat_map(|o| o.values_mut())
     }
     for mesh in list(document, "meshes") {
