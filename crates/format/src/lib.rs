@@ -36,7 +36,7 @@ mod warning;
 pub use crate::error::FormatError;
 pub use crate::export::{CellTable, write_csv, write_npz, write_ply, write_vtu};
 pub use crate::exr::{write_exr, write_exr_aovs};
-pub use crate::gltf::{Lit, LitMaterial, LitPage, LitPicture, LitSurface, LitVertex, write_glb, write_lit_glb};
+pub use crate::gltf::{Lit, LitGlb, LitMaterial, LitPage, LitPicture, LitSurface, LitVertex, write_glb, write_lit_glb};
 pub use crate::ies::read_ies;
 pub use crate::ktx2::{Ktx2Format, Ktx2Packing, write_ktx2};
 pub use crate::limits::Limits;

@@ -121,7 +121,7 @@ impl<'v> Accessor<'v> {
         if element.text("type")? != Some(expected.kind) {
             return Err(kind.invalid(expected.kind));
         }
-        let size = component.bytes() * components_of(expected.kind);
+        let size = element_bytes(component, expected.kind);
         let counter = element.require("count", "the number of elements")?;
         let count = usize::try_from(counter.as_integer()?).unwrap_or(usize::MAX);
         // Indices are 32 bits wide, and their largest value means "restart".
@@ -246,11 +246,16 @@ fn extent<'v>(
     Ok((bytes, stride))
 }
 
-pub(super) fn components_of(kind: &str) -> usize {
+/// Bytes of an element. Columns of matrices start at multiples of four bytes (glTF §3.6.2.4).
+pub(super) fn element_bytes(component: Component, kind: &str) -> usize {
+    let columns = |n: usize| n * (n * component.bytes()).next_multiple_of(4);
     match kind {
-        "VEC2" => 2,
-        "VEC3" => 3,
-        "VEC4" => 4,
-        _ => 1,
+        "VEC2" => 2 * component.bytes(),
+        "VEC3" => 3 * component.bytes(),
+        "VEC4" => 4 * component.bytes(),
+        "MAT2" => columns(2),
+        "MAT3" => columns(3),
+        "MAT4" => columns(4),
+        _ => component.bytes(),
     }
 }

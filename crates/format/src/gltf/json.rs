@@ -5,7 +5,7 @@
 //! (which glTF allows), names no element when a type is wrong, refuses a file for faults in parts that light does
 //! not need, and unpacks `{}` to many hundred bytes.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::context::Context;
 use crate::error::FormatError;
@@ -62,6 +62,11 @@ impl<'a> Element<'a> {
     /// Name of the file.
     pub(super) fn file(&self) -> &'a str {
         self.file
+    }
+
+    /// The value itself.
+    pub(super) fn value(&self) -> &'a Value {
+        self.value
     }
 
     /// The member `key`, if there is one. `null` counts as absent: some exporters write it.
@@ -124,10 +129,7 @@ impl<'a> Element<'a> {
 
     /// This value as a non-negative integer; 1.0 is one too.
     pub(super) fn as_integer(&self) -> Result<u64, FormatError> {
-        // Doubles are exact up to 2⁵³, far beyond any count in a file.
-        let from_float = |v: f64| (v.fract() == 0.0 && (0.0..9.0e15).contains(&v)).then_some(v as u64);
-        let integer = self.value.as_u64().or_else(|| self.value.as_f64().and_then(from_float));
-        integer.ok_or_else(|| self.invalid("a non-negative integer"))
+        integer(self.value).ok_or_else(|| self.invalid("a non-negative integer"))
     }
 
     /// The index `key` into the root's array `array`, and that item.
@@ -201,6 +203,27 @@ impl<'a> Element<'a> {
     pub(super) fn fault(&self, found: impl Into<String>, expected: impl Into<String>) -> FormatError {
         FormatError::invalid(self.file, &self.path, found, expected)
     }
+}
+
+/// A value as a non-negative integer; 1.0 is one too.
+pub(super) fn integer(value: &Value) -> Option<u64> {
+    // Doubles are exact up to 2⁵³, far beyond any count in a file.
+    let from_float = |v: f64| (v.fract() == 0.0 && (0.0..9.0e15).contains(&v)).then_some(v as u64);
+    value.as_u64().or_else(|| value.as_f64().and_then(from_float))
+}
+
+/// A value as an index.
+pub(super) fn index(value: &Value) -> Option<usize> {
+    integer(value).and_then(|i| usize::try_from(i).ok())
+}
+
+/// The object `key` of `owner`, made if there is none. `None` if something else stands there.
+pub(super) fn object<'v>(owner: &'v mut Value, key: &str) -> Option<&'v mut Map<String, Value>> {
+    let member = owner.as_object_mut()?.entry(key).or_insert(Value::Null);
+    if member.is_null() {
+        *member = Value::Object(Map::new());
+    }
+    member.as_object_mut()
 }
 
 #[cfg(test)]

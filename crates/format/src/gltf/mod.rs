@@ -32,7 +32,7 @@ use crate::error::FormatError;
 use crate::geometry::{Account, RICHEST_VERTEX, clean, mesh_bytes, no_triangles};
 use crate::read::Origin;
 
-pub use self::lit::{Lit, LitMaterial, LitPage, LitPicture, LitSurface, LitVertex, write_lit_glb};
+pub use self::lit::{Lit, LitGlb, LitMaterial, LitPage, LitPicture, LitSurface, LitVertex, write_lit_glb};
 pub use self::write::write_glb;
 
 /// Extensions that are read, or whose absence from the result is named where it shows.
@@ -107,9 +107,8 @@ struct Content<'v, 'b> {
     meshes: HashMap<usize, Vec<usize>>,
     lights: Lights,
     account: Account,
-    /// Of each of our meshes: the number of its primitive, and which elements of its accessors its vertices are. `None` for copies that
-    /// were changed.
-    primitives_of_meshes: Vec<Option<(usize, Arc<[u32]>)>>,
+    /// Of each of our meshes: the number of its primitive, and which elements of its accessors its vertices are.
+    primitives_of_meshes: Vec<(usize, Arc<[u32]>)>,
     /// One for each instance.
     origins: Vec<Option<Origin>>,
     /// Where each camera of the scene is among the placed nodes.
@@ -140,12 +139,8 @@ impl Content<'_, '_> {
             context.charge(256 + name.len() as u64, &place.node.path)?;
             context.charge(256 + name.len() as u64, &place.node.path)?;
             self.account.add(context, &place.node.path, self.scene.meshes[mesh].triangles.len())?;
-            self.origins.push(self.primitives_of_meshes[mesh].as_ref().map(|(primitive, vertices)| Origin {
-                node: place.index,
-                mesh: index,
-                primitive: *primitive,
-                vertices: vertices.clone(),
-            }));
+            let (primitive, vertices) = self.primitives_of_meshes[mesh].clone();
+            self.origins.push(Some(Origin { node: place.index, mesh: index, primitive, vertices }));
             self.scene.instances.push(Instance { name: name.clone(), mesh, transform });
         }
         Ok(())
@@ -167,7 +162,7 @@ impl Content<'_, '_> {
             let Some((read, vertices)) = self.primitives.read(context, root, &primitive, &name)? else { continue };
             // Beside the arrays of the mesh, which are at least three times as large.
             context.charge(vertices.len() as u64 * 4, &primitive.path)?;
-            self.primitives_of_meshes.push(Some((i, vertices.into())));
+            self.primitives_of_meshes.push((i, vertices.into()));
             let material = self.materials.of(context, root, self.buffers, &primitive)?;
             self.scene.meshes.push(Mesh { material, ..read });
             meshes.push(self.scene.meshes.len() - 1);
@@ -196,12 +191,17 @@ impl Content<'_, '_> {
         for p in &mut flat.positions {
             *p = (m * glam::Vec3::from(*p).as_dvec3()).as_vec3().to_array();
         }
-        clean(context, &mut flat);
+        let left = clean(context, &mut flat);
         if flat.triangles.is_empty() {
             return Ok(None);
         }
+        let (primitive, vertices) = self.primitives_of_meshes[mesh].clone();
+        let vertices = match left {
+            Some(left) => vertices.iter().zip(left).filter(|(_, left)| *left).map(|(&v, _)| v).collect(),
+            None => vertices,
+        };
         self.scene.meshes.push(flat);
-        self.primitives_of_meshes.push(None);
+        self.primitives_of_meshes.push((primitive, vertices));
         Ok(Some((self.scene.meshes.len() - 1, DAffine3::from_translation(to_world.translation))))
     }
 }

@@ -11,6 +11,7 @@ mod gltf_nodes;
 mod ies;
 mod ktx2;
 mod limits;
+mod lit;
 mod mutation;
 mod obj;
 mod pictures;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, anyhow};
-use twinray::format::{self, Lit, Origin};
+use twinray::format::{self, Lit, LitGlb, Origin};
 use twinray::scene::Scene;
 
 use crate::args::ReadArgs;
@@ -40,7 +40,7 @@ impl Document {
     }
 
     /// The document with light in it.
-    pub fn lit(&self, lit: &Lit, args: &ReadArgs) -> anyhow::Result<Vec<u8>> {
+    pub fn lit(&self, lit: &Lit, args: &ReadArgs) -> anyhow::Result<LitGlb> {
         let limits = input::limits(args);
         let folder = Folder::of(Path::new(&self.name), args.allow_outside, limits.max_file_bytes);
         let mut resolver = |reference: &str| match self.is_own {

@@ -12,7 +12,7 @@ use twinray::bake::{
     self, AtlasError, AtlasOptions, Cancelled, Layout, Lightmap, LightmapOptions, Part, Quality, Stage, TexelDensity,
     VertexLight,
 };
-use twinray::format::{Lit, LitPage, LitSurface, LitVertex};
+use twinray::format::{Lit, LitGlb, LitPage, LitSurface, LitVertex};
 use twinray::render::{Exposure, PictureOptions, render};
 use twinray::scene::{Rgb, Scene, Side};
 use twinray::solve::Solution;
@@ -83,7 +83,10 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     let about = about(&scene, &loaded, &solution, settings, &baked);
     let lit =
         Lit { surfaces: baked.surfaces, pages: baked.pages, drop_lights: !args.keep_lights, about: about.clone() };
-    let bytes = document.lit(&lit, &args.load.read)?;
+    let LitGlb { bytes, warnings } = document.lit(&lit, &args.load.read)?;
+    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    commands::print_warnings(&warnings, args.load.quiet);
+    loaded.warnings.extend(warnings);
     for (path, bytes) in &baked.files {
         Output::open(path)?.write(bytes)?;
     }

@@ -1,13 +1,13 @@
 //! Primitives anew: attributes of any kind copied vertex by vertex, and the light's own.
 
-use std::collections::BTreeMap;
-
 use serde_json::{Map, Value, json};
 
-use super::super::accessor::{Accessor, Component, Expected};
+use super::super::accessor::{Accessor, Component, Expected, element_bytes};
 use super::super::container::Buffers;
 use super::super::json::Element;
+use super::references::fresh;
 use super::{LitSurface, LitVertex};
+use crate::context::Context;
 use crate::error::FormatError;
 
 const ALL: [Component; 6] =
@@ -21,35 +21,22 @@ pub(super) struct Geometry<'v, 'b> {
     pub accessors: Vec<Value>,
     /// Views to be added, without buffer and offset, and their bytes.
     pub views: Vec<(Value, Vec<u8>)>,
-    /// Irradiance that is 1 in `COLOR_0` of the mesh at hand.
-    scale: Option<f32>,
 }
 
-/// A new primitive.
-pub(super) struct Made {
-    pub value: Value,
-    /// The number of the set of texture coordinates that was the second.
-    pub moved_to: u64,
-}
-
-/// Marks indices of new things until `tidy` knows their numbers.
-pub(super) fn fresh(index: usize) -> Value {
-    json!({ "twinray_new": index })
-}
-
-/// The index behind such a mark.
-pub(super) fn is_fresh(value: &Value) -> Option<usize> {
-    value.get("twinray_new")?.as_u64().map(|i| i as usize)
+/// What is to become of a primitive.
+pub(super) struct Wanted<'a> {
+    pub surface: &'a LitSurface,
+    /// Elements of the accessors that the vertices of the surface's mesh were.
+    pub vertices: &'a [u32],
+    /// Its materials use the second set of texture coordinates.
+    pub keeps_second_set: bool,
+    /// Irradiance that is 1 in `COLOR_0`.
+    pub scale: Option<f32>,
 }
 
 impl<'v, 'b> Geometry<'v, 'b> {
     pub fn new(root: &'v Element<'v>, buffers: &'v Buffers<'b>) -> Self {
-        Self { root, buffers, accessors: Vec::new(), views: Vec::new(), scale: None }
-    }
-
-    /// The scale of the colours of primitives since the last call.
-    pub fn take_scale(&mut self) -> Option<f32> {
-        self.scale.take()
+        Self { root, buffers, accessors: Vec::new(), views: Vec::new() }
     }
 
     /// A view of bytes of a picture and the like.
@@ -58,104 +45,124 @@ impl<'v, 'b> Geometry<'v, 'b> {
         fresh(self.views.len() - 1)
     }
 
-    /// `primitive` as `surface` has it, whose mesh has these `vertices` of the accessors. The second set of texture
-    /// coordinates stays under another number if `keep_second`.
+    /// `primitive` as a surface has it, and the number of the set of texture coordinates that was the second.
     pub fn primitive(
         &mut self,
-        primitive: &Value,
-        element: &Element<'_>,
-        surface: &LitSurface,
-        vertices: &[u32],
-        keep_second: bool,
-    ) -> Result<Made, FormatError> {
-        let mut out = primitive.clone();
-        let sources: Vec<u32> =
-            surface.vertices.iter().map(|v| vertices.get(v.source as usize).copied().unwrap_or(0)).collect();
-        let old = element.require("attributes", "an object of accessors")?;
-        let mut attributes = Map::new();
-        let has = |key: &str| primitive["attributes"].get(key).is_some();
-        let next = (2..).find(|k| !has(&format!("TEXCOORD_{k}"))).unwrap_or(2);
-        let texcoords = all(surface, |v| v.texcoord);
-        let irradiance = all(surface, |v| v.irradiance);
-        for key in old.keys() {
-            let name = match key {
-                "TEXCOORD_1" if texcoords.is_some() && keep_second => format!("TEXCOORD_{next}"),
-                "TEXCOORD_1" if texcoords.is_some() => continue,
-                "COLOR_0" if irradiance.is_some() => continue,
-                _ => key.to_owned(),
-            };
-            let turn = if surface.back { Turn::of(key) } else { Turn::None };
-            attributes.insert(name, self.copy(&old, key, &sources, turn)?);
-        }
-        if let Some(texcoords) = &texcoords {
-            attributes.insert("TEXCOORD_1".into(), self.floats(texcoords, "VEC2"));
-        }
-        if let Some(irradiance) = &irradiance {
-            attributes.insert("_IRRADIANCE".into(), self.floats(irradiance, "VEC3"));
-            let scale = irradiance.iter().flatten().copied().fold(self.scale.unwrap_or(0.0), f32::max);
-            self.scale = Some(scale);
-            // All primitives of a mesh share their scale, which `colours` puts in once it is known.
-            attributes.insert("COLOR_0".into(), json!({ "twinray_colour": irradiance }));
-        }
-        out["attributes"] = Value::Object(attributes);
-        if let Some(targets) = primitive["targets"].as_array() {
-            let mut list = Vec::new();
-            for k in 0..targets.len() {
-                let Some(target) = element.item("targets", k) else { continue };
-                let mut copied = Map::new();
-                for key in target.keys() {
-                    // Displacements of normals turn round with them.
-                    let turn = if surface.back && key == "NORMAL" { Turn::Negated } else { Turn::None };
-                    copied.insert(key.to_owned(), self.copy(&target, key, &sources, turn)?);
-                }
-                list.push(Value::Object(copied));
+        context: &mut Context<'_>,
+        primitive: &Element<'_>,
+        wanted: &Wanted<'_>,
+    ) -> Result<(Value, u64), FormatError> {
+        let Wanted { surface, vertices, .. } = wanted;
+        let element_of = |v: &LitVertex| vertices.get(v.source as usize).copied().unwrap_or(0);
+        let sources: Vec<u32> = surface.vertices.iter().map(element_of).collect();
+        let old = primitive.require("attributes", "an object of accessors")?;
+        let turn = |key: &str| if surface.back { Turn::of(key) } else { Turn::None };
+        let mut attributes = self.copies(context, &old, &sources, turn)?;
+        // Numbers of sets follow each other (glTF §3.7.2.1), so that the next one is free.
+        let next = |attributes: &Map<String, Value>, set: &str| -> u64 {
+            (1..).find(|k| !attributes.contains_key(&format!("{set}_{k}"))).unwrap_or(1)
+        };
+        let mut second = 1;
+        if let Some(texcoords) = all(surface, |v| v.texcoord) {
+            let replaced = attributes.remove("TEXCOORD_1").filter(|_| wanted.keeps_second_set);
+            let ours = self.floats(&texcoords, "VEC2");
+            // No second set without a first.
+            attributes.entry("TEXCOORD_0").or_insert_with(|| ours.clone());
+            attributes.insert("TEXCOORD_1".into(), ours);
+            if let Some(replaced) = replaced {
+                second = next(&attributes, "TEXCOORD");
+                attributes.insert(format!("TEXCOORD_{second}"), replaced);
             }
-            out["targets"] = Value::Array(list);
         }
+        if let (Some(irradiance), Some(scale)) = (all(surface, |v| v.irradiance), wanted.scale) {
+            attributes.insert("_IRRADIANCE".into(), self.floats(&irradiance, "VEC3"));
+            let colours = self.colours(&irradiance, scale);
+            if let Some(replaced) = attributes.insert("COLOR_0".into(), colours) {
+                let number = next(&attributes, "COLOR");
+                let message =
+                    format!("gives its place to irradiance; the old colours are COLOR_{number}, which viewers ignore");
+                context.warn(format!("{}.COLOR_0", old.path), message);
+                attributes.insert(format!("COLOR_{number}"), replaced);
+            }
+        }
+        let mut targets = Vec::new();
+        for target in (0..primitive.count("targets")).filter_map(|k| primitive.item("targets", k)) {
+            // Displacements of normals turn round with them; those of tangents have no handedness.
+            let turn = |key: &str| if surface.back && key == "NORMAL" { Turn::Negated } else { Turn::None };
+            targets.push(Value::Object(self.copies(context, &target, &sources, turn)?));
+        }
+
+        let mut out = primitive.value().clone();
+        out["attributes"] = Value::Object(attributes);
         out["indices"] = self.indices(&surface.triangles, surface.vertices.len());
+        if !targets.is_empty() {
+            out["targets"] = Value::Array(targets);
+        }
         if let Some(out) = out.as_object_mut() {
             out.remove("mode");
+            // The packed form is that of the old geometry.
+            remove_extension(out, "KHR_draco_mesh_compression");
         }
-        Ok(Made { value: out, moved_to: next })
+        Ok((out, second))
     }
 
-    /// Colours of all primitives of a mesh by one scale, which is told.
-    pub fn colours(&mut self, primitives: &mut [Value], scale: f32) {
-        for primitive in primitives {
-            let Some(colour) = primitive["attributes"].get_mut("COLOR_0") else { continue };
-            let Some(list) = colour.get("twinray_colour").and_then(Value::as_array) else { continue };
-            let unit =
-                |v: &Value| (v.as_f64().unwrap_or(0.0) / f64::from(scale.max(f32::MIN_POSITIVE))).clamp(0.0, 1.0);
-            let bytes: Vec<u8> = list
-                .iter()
-                .flat_map(|c| [unit(&c[0]), unit(&c[1]), unit(&c[2]), 1.0])
-                .flat_map(|c| ((c * 65535.0).round() as u16).to_le_bytes())
-                .collect();
-            let count = list.len();
-            let view = self.view(json!({ "target": 34962 }), bytes);
-            self.accessors.push(
-                json!({ "bufferView": view, "componentType": 5123, "normalized": true, "count": count, "type": "VEC4" }),
-            );
-            *colour = fresh(self.accessors.len() - 1);
+    /// The accessors of `owner`, element by element in the order of `sources`. What cannot be read is left out, as it was when
+    /// the scene was read; there is nothing without positions.
+    fn copies(
+        &mut self,
+        context: &mut Context<'_>,
+        owner: &Element<'_>,
+        sources: &[u32],
+        turn: impl Fn(&str) -> Turn,
+    ) -> Result<Map<String, Value>, FormatError> {
+        let mut out = Map::new();
+        for key in owner.keys() {
+            match self.copy(owner, key, sources, turn(key)) {
+                Ok(copied) => out.extend(copied.map(|c| (key.to_owned(), c))),
+                Err(error) if key == "POSITION" => return Err(error),
+                Err(error) => {
+                    context.warn(format!("{}.{key}", owner.path), format!("{}: left out", error.without_place()))
+                }
+            }
         }
+        Ok(out)
     }
 
-    /// Elements of the accessor `key`, in the order of `sources`.
-    fn copy(&mut self, owner: &Element<'_>, key: &str, sources: &[u32], turn: Turn) -> Result<Value, FormatError> {
-        let Some((_, element)) = owner.follow(key, self.root, "accessors")? else { return Ok(Value::Null) };
+    /// Irradiance as colours of sixteen bits; `scale` is white.
+    fn colours(&mut self, irradiance: &[[f32; 3]], scale: f32) -> Value {
+        let unit = |c: f32| (f64::from(c) / f64::from(scale.max(f32::MIN_POSITIVE))).clamp(0.0, 1.0);
+        let texels = irradiance.iter().flat_map(|&[r, g, b]| [unit(r), unit(g), unit(b), 1.0]);
+        let bytes = texels.flat_map(|c| ((c * 65535.0).round() as u16).to_le_bytes()).collect();
+        let view = self.view(json!({ "target": 34962 }), bytes);
+        let count = irradiance.len();
+        self.accessor(json!({
+            "bufferView": view, "componentType": 5123, "normalized": true, "count": count, "type": "VEC4",
+        }))
+    }
+
+    /// Elements of the accessor `key`.
+    fn copy(
+        &mut self,
+        owner: &Element<'_>,
+        key: &str,
+        sources: &[u32],
+        turn: Turn,
+    ) -> Result<Option<Value>, FormatError> {
+        let Some((_, element)) = owner.follow(key, self.root, "accessors")? else { return Ok(None) };
         let kind = element.text("type")?.unwrap_or_default();
         let accessor = Accessor::load(self.root, self.buffers, &element, &Expected { kind, components: &ALL })?;
+        if let Some(beyond) = sources.iter().find(|&&s| s as usize >= accessor.count) {
+            return Err(element.fault(format!("{} elements", accessor.count), format!("one number {beyond}")));
+        }
         let code = element.integer("componentType")?.unwrap_or_default();
         let component = Component::from_code(code).unwrap_or(Component::F32);
-        let components = super::super::accessor::components_of(kind);
-        let (width, size) = (component.bytes(), component.bytes() * components);
+        let (width, size) = (component.bytes(), element_bytes(component, kind));
         // Attributes start at multiples of four bytes (glTF §3.6.2.4).
         let stride = size.next_multiple_of(4);
         let mut bytes = Vec::with_capacity(stride * sources.len());
         for &source in sources {
-            let from = if (source as usize) < accessor.count { accessor.element(source as usize) } else { &[] };
             let start = bytes.len();
-            bytes.extend(from.iter().take(size));
+            bytes.extend(accessor.element(source as usize).iter().take(size));
             bytes.resize(start + stride, 0);
             let element = &mut bytes[start..start + size];
             match turn {
@@ -164,8 +171,10 @@ impl<'v, 'b> Geometry<'v, 'b> {
                 Turn::Handedness => element.chunks_mut(width).skip(3).for_each(|c| negate(c, component)),
             }
         }
+        let bounds = (key == "POSITION").then(|| bounds(&bytes, stride, component));
         let mut view = json!({ "target": 34962 });
-        if stride != size {
+        // What the last column of a matrix is filled up with is not everybody's part of it.
+        if stride != size || kind.starts_with("MAT") {
             view["byteStride"] = json!(stride);
         }
         let view = self.view(view, bytes);
@@ -173,24 +182,23 @@ impl<'v, 'b> Geometry<'v, 'b> {
         if element.flag("normalized") {
             out["normalized"] = json!(true);
         }
-        if key == "POSITION" {
-            let places: Vec<[f32; 3]> = sources.iter().map(|&s| raw(accessor.element(s as usize), component)).collect();
-            let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
-                (0..3).map(|c| places.iter().map(|p| p[c]).reduce(pick).unwrap_or(0.0)).collect()
-            };
-            out["min"] = json!(bound(f32::min));
-            out["max"] = json!(bound(f32::max));
+        if let Some([min, max]) = bounds {
+            (out["min"], out["max"]) = (min, max);
         }
-        self.accessors.push(out);
-        Ok(fresh(self.accessors.len() - 1))
+        Ok(Some(self.accessor(out)))
+    }
+
+    /// Adds an accessor.
+    fn accessor(&mut self, value: Value) -> Value {
+        self.accessors.push(value);
+        fresh(self.accessors.len() - 1)
     }
 
     fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str) -> Value {
         let bytes = values.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         let view = self.view(json!({ "target": 34962 }), bytes);
         let count = values.len();
-        self.accessors.push(json!({ "bufferView": view, "componentType": 5126, "count": count, "type": kind }));
-        fresh(self.accessors.len() - 1)
+        self.accessor(json!({ "bufferView": view, "componentType": 5126, "count": count, "type": kind }))
     }
 
     fn indices(&mut self, triangles: &[[u32; 3]], vertices: usize) -> Value {
@@ -203,8 +211,7 @@ impl<'v, 'b> Geometry<'v, 'b> {
         };
         let view = self.view(json!({ "target": 34963 }), bytes);
         let count = 3 * triangles.len();
-        self.accessors.push(json!({ "bufferView": view, "componentType": code, "count": count, "type": "SCALAR" }));
-        fresh(self.accessors.len() - 1)
+        self.accessor(json!({ "bufferView": view, "componentType": code, "count": count, "type": "SCALAR" }))
     }
 }
 
@@ -240,56 +247,28 @@ fn negate(bytes: &mut [u8], component: Component) {
     }
 }
 
-/// Three components as they are stored: bounds of accessors are not normalized (glTF §3.6.2.5).
-fn raw(bytes: &[u8], component: Component) -> [f32; 3] {
-    std::array::from_fn(|c| {
-        let at = bytes.get(c * component.bytes()..);
-        at.filter(|b| b.len() >= component.bytes()).map_or(0.0, |b| component.read(b) as f32)
-    })
+/// The smallest and the largest of each of three components as they are stored: bounds of accessors are not normalized
+/// (glTF §3.6.2.5).
+fn bounds(bytes: &[u8], stride: usize, component: Component) -> [Value; 2] {
+    let value = |element: &[u8], c: usize| element.get(c * component.bytes()..).map_or(0.0, |b| component.read(b));
+    let bound = |pick: fn(f64, f64) -> f64| -> Vec<Value> {
+        let over = |c: usize| bytes.chunks(stride.max(1)).map(|e| value(e, c)).reduce(pick).unwrap_or(0.0);
+        let number = |v: f64| if component == Component::F32 { json!(v) } else { json!(v as i64) };
+        (0..3).map(|c| number(over(c))).collect()
+    };
+    [bound(f64::min), bound(f64::max)].map(Value::Array)
+}
+
+/// Takes an extension out of an object, and what held it where nothing is left.
+fn remove_extension(owner: &mut Map<String, Value>, name: &str) {
+    let Some(extensions) = owner.get_mut("extensions").and_then(Value::as_object_mut) else { return };
+    extensions.remove(name);
+    if extensions.is_empty() {
+        owner.remove("extensions");
+    }
 }
 
 /// A value of every vertex, if all have it.
 fn all<T>(surface: &LitSurface, value: impl Fn(&LitVertex) -> Option<T>) -> Option<Vec<T>> {
     surface.vertices.iter().map(value).collect()
-}
-
-/// Accessors that primitives, skins, animations and instancing refer to: how often each.
-pub(super) fn references(document: &Value) -> BTreeMap<usize, usize> {
-    let mut count = BTreeMap::new();
-    walk_references(&mut document.clone(), &mut |value| {
-        if let Some(index) = value.as_u64() {
-            *count.entry(index as usize).or_default() += 1;
-        }
-    });
-    count
-}
-
-/// Calls `each` with every place that refers to an accessor.
-pub(super) fn walk_references(document: &mut Value, each: &mut dyn FnMut(&mut Value)) {
-    fn list<'a>(value: &'a mut Value, key: &str) -> impl Iterator<Item = &'a mut Value> {
-        value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
-    }
-    fn members<'a>(value: Option<&'a mut Value>) -> impl Iterator<Item = &'a mut Value> {
-        value.and_then(Value::as_object_mut).into_iter().flat_map(|o| o.values_mut())
-    }
-    for mesh in list(document, "meshes") {
-        for primitive in list(mesh, "primitives") {
-            members(primitive.get_mut("attributes")).for_each(&mut *each);
-            primitive.get_mut("indices").into_iter().for_each(&mut *each);
-            list(primitive, "targets").for_each(|t| members(Some(t)).for_each(&mut *each));
-        }
-    }
-    for skin in list(document, "skins") {
-        skin.get_mut("inverseBindMatrices").into_iter().for_each(&mut *each);
-    }
-    for animation in list(document, "animations") {
-        for sampler in list(animation, "samplers") {
-            sampler.get_mut("input").into_iter().for_each(&mut *each);
-            sampler.get_mut("output").into_iter().for_each(&mut *each);
-        }
-    }
-    for node in list(document, "nodes") {
-        let instancing = node.pointer_mut("/extensions/EXT_mesh_gpu_instancing/attributes");
-        members(instancing).for_each(&mut *each);
-    }
 }

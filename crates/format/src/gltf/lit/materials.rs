@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value, json};
 
+use super::super::json::{index, object};
 use super::geometry::Geometry;
 use super::{Lit, LitMaterial, LitPicture, LitSurface};
 
@@ -25,39 +26,57 @@ impl<'a> Materials<'a> {
 
     fn material(&self, index: Option<usize>) -> Value {
         let materials = &self.original["materials"];
-        index.and_then(|i| materials.get(i)).cloned().unwrap_or_else(|| json!({}))
+        let found = index.and_then(|i| materials.get(i)).filter(|m| m.is_object());
+        found.cloned().unwrap_or_else(|| json!({}))
     }
 
-    /// True if textures of a material lie on the second set of coordinates.
-    pub fn uses_second_set(&self, material: Option<usize>) -> bool {
+    /// True if textures of a primitive's materials lie on the second set of coordinates.
+    pub fn uses_second_set(&self, primitive: &Value) -> bool {
+        let mut primitive = primitive.clone();
         let mut found = false;
-        walk_sets(&mut self.material(material), &mut |set| found |= set.as_u64() == Some(1));
+        walk_materials(&mut primitive, &mut |material| {
+            found |= self.is_on_second_set(material.as_ref().and_then(index))
+        });
         found
     }
 
-    /// The material of a surface, whose old second set of coordinates is now number `moved_to`.
-    pub fn of(&mut self, original: Option<usize>, surface: &LitSurface, moved_to: u64) -> Option<usize> {
-        let moves = self.uses_second_set(original) && surface.vertices.iter().all(|v| v.texcoord.is_some());
-        let one_sided = surface.one_sided && self.material(original)["doubleSided"] == json!(true);
-        let key = (original, surface.page, one_sided, moves.then_some(moved_to));
-        if key == (original, None, false, None) {
-            return original;
-        }
-        let first = self.original["materials"].as_array().map_or(0, Vec::len);
-        let index = *self.known.entry(key).or_insert_with(|| {
-            self.added.push(key);
-            first + self.added.len() - 1
-        });
-        Some(index)
+    fn is_on_second_set(&self, material: Option<usize>) -> bool {
+        let mut found = false;
+        walk_sets(&mut self.material(material), &mut |set| found |= index(set) == Some(1));
+        found
     }
 
-    /// Adds the copies and their pictures to the document.
-    pub fn finish(
-        self,
-        document: &mut Value,
-        geometry: &mut Geometry<'_, '_>,
-        extensions: &mut BTreeSet<&'static str>,
-    ) {
+    /// Gives a primitive that stands for `surface` its materials, those of its variants too. The old second set of
+    /// coordinates now has the number `second`.
+    pub fn assign(&mut self, primitive: &mut Value, surface: &LitSurface, second: u64) {
+        walk_materials(primitive, &mut |material| {
+            let original = material.as_ref().and_then(index);
+            if let Some(copy) = self.of(original, surface, second) {
+                *material = Some(json!(copy));
+            }
+        });
+    }
+
+    /// The copy of a material that a surface needs; `None` if it needs none.
+    fn of(&mut self, original: Option<usize>, surface: &LitSurface, second: u64) -> Option<usize> {
+        let moved = (second > 1 && self.is_on_second_set(original)).then_some(second);
+        let one_sided = surface.one_sided && self.material(original)["doubleSided"] == json!(true);
+        let page = surface.page.filter(|&p| p < self.lit.pages.len());
+        let key = (original, page, one_sided, moved);
+        if key == (original, None, false, None) {
+            return None;
+        }
+        let first = self.original["materials"].as_array().map_or(0, Vec::len);
+        let added = &mut self.added;
+        Some(*self.known.entry(key).or_insert_with(|| {
+            added.push(key);
+            first + added.len() - 1
+        }))
+    }
+
+    /// Adds the copies and their pictures to the document; answers with the extensions that they use.
+    pub fn finish(self, document: &mut Value, geometry: &mut Geometry<'_, '_>) -> BTreeSet<&'static str> {
+        let mut extensions = BTreeSet::new();
         let mut pictures = Pictures { document, geometry };
         let pages: Vec<Shown> = self.lit.pages.iter().map(|page| Shown::new(&page.material, &mut pictures)).collect();
         let mut copies = Vec::new();
@@ -65,7 +84,7 @@ impl<'a> Materials<'a> {
             let mut material = self.material(original);
             if let Some(number) = moved {
                 walk_sets(&mut material, &mut |set| {
-                    if set.as_u64() == Some(1) {
+                    if index(set) == Some(1) {
                         *set = json!(number);
                     }
                 });
@@ -74,7 +93,7 @@ impl<'a> Materials<'a> {
                 material["doubleSided"] = json!(false);
             }
             if let Some(page) = page.and_then(|p| pages.get(p)) {
-                page.put(&mut material, extensions);
+                page.put(&mut material, &mut extensions);
             }
             copies.push(material);
         }
@@ -83,6 +102,7 @@ impl<'a> Materials<'a> {
             list.extend(copies);
             document["materials"] = Value::Array(list);
         }
+        extensions
     }
 }
 
@@ -141,13 +161,13 @@ impl Shown {
     fn put(&self, material: &mut Value, extensions: &mut BTreeSet<&'static str>) {
         match self {
             Self::Lightmap { image, scale, texture, intensity } => {
-                material["extensions"]["MOZ_lightmap"] =
-                    json!({ "index": texture, "texCoord": 1, "intensity": intensity });
-                material["extensions"]["TWINRAY_lightmap"] =
-                    json!({ "image": image, "texCoord": 1, "quantity": "irradiance", "scale": scale });
+                let moz = json!({ "index": texture, "texCoord": 1, "intensity": intensity });
+                let ours = json!({ "image": image, "texCoord": 1, "quantity": "irradiance", "scale": scale });
+                put(material, "extensions", "MOZ_lightmap", moz);
+                put(material, "extensions", "TWINRAY_lightmap", ours);
                 extensions.extend(["MOZ_lightmap", "TWINRAY_lightmap"]);
             }
-            Self::Beside(value) => material["extras"]["twinray_lightmap"] = value.clone(),
+            Self::Beside(value) => put(material, "extras", "twinray_lightmap", value.clone()),
             Self::Unlit { texture } => {
                 let mut unlit = Map::new();
                 for key in ["name", "extras", "alphaMode", "alphaCutoff", "doubleSided"] {
@@ -166,6 +186,29 @@ impl Shown {
             }
         }
     }
+}
+
+/// Sets `owner[group][key]`. What is there instead of a group is kept within it.
+fn put(owner: &mut Value, group: &str, key: &str, value: Value) {
+    if let Some(other) = owner.get_mut(group).filter(|g| !g.is_object() && !g.is_null()) {
+        *other = json!({ "value": other });
+    }
+    if let Some(group) = object(owner, group) {
+        group.insert(key.to_owned(), value);
+    }
+}
+
+/// Calls `each` with the number of a primitive's material, then with those of its variants (`KHR_materials_variants`).
+fn walk_materials(primitive: &mut Value, each: &mut dyn FnMut(&mut Option<Value>)) {
+    fn visit(owner: &mut Value, each: &mut dyn FnMut(&mut Option<Value>)) {
+        let Some(owner) = owner.as_object_mut() else { return };
+        let mut material = owner.remove("material");
+        each(&mut material);
+        owner.extend(material.map(|m| ("material".to_owned(), m)));
+    }
+    visit(primitive, each);
+    let mappings = primitive.pointer_mut("/extensions/KHR_materials_variants/mappings").and_then(Value::as_array_mut);
+    mappings.into_iter().flatten().for_each(|m| visit(m, each));
 }
 
 /// Calls `each` with the set of coordinates of every texture of a material.

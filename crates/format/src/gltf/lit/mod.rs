@@ -2,24 +2,26 @@
 //! names, animations, materials, extensions that nobody here knows.
 //!
 //! `geometry` makes primitives with new texture coordinates, `materials` those that show the light, `tidy` puts all binary data into one
-//! chunk and leaves out what nothing refers to any more.
+//! chunk and leaves out what nothing refers to any more, by the `references` that there are.
 
 mod geometry;
 mod materials;
+mod references;
 mod tidy;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use self::geometry::Geometry;
+use self::geometry::{Geometry, Wanted};
 use self::materials::Materials;
 use super::container::{self, Buffers};
-use super::json::{self, Element};
+use super::json::{self, Element, index, object};
 use crate::context::Context;
 use crate::error::FormatError;
 use crate::limits::Limits;
 use crate::read::{Origin, Resolver};
+use crate::warning::Warning;
 
 /// Baked light for a document.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +60,8 @@ pub struct LitVertex {
     pub source: u32,
     /// `TEXCOORD_1`.
     pub texcoord: Option<[f32; 2]>,
-    /// Irradiance, W·m⁻² (or lux): `_IRRADIANCE`, and `COLOR_0` within [0, 1].
+    /// Irradiance, W·m⁻² (or lux): `_IRRADIANCE`, and in `COLOR_0` as a part of the largest of the node's, which is the mesh's
+    /// extra `twinray_irradiance_scale`.
     pub irradiance: Option<[f32; 3]>,
 }
 
@@ -102,15 +105,29 @@ pub enum LitMaterial {
     Unlit(LitPicture),
 }
 
+/// A document with baked light.
+#[derive(Clone, Debug)]
+pub struct LitGlb {
+    /// The `.glb` file.
+    pub bytes: Vec<u8>,
+    /// What of the document could not be kept as it was.
+    pub warnings: Vec<Warning>,
+}
+
 /// Writes a document with baked light as one `.glb` file. `name`, `source`, `resolver` and `limits` are those of
 /// [`crate::read_scene`], which gave `origins`.
 ///
 /// A primitive that has surfaces is replaced by them: attributes of any kind, morph targets among them, are copied vertex by
-/// vertex; `TEXCOORD_1` becomes the lightmap's, and where the material uses the old one, that is kept under the next free number.
-/// Nodes that shared a mesh get meshes of their own. Equal arguments give equal bytes.
+/// vertex; `TEXCOORD_1` becomes the lightmap's, and where the material uses the old one, that is kept under the next free number,
+/// as is `COLOR_0` where vertices carry irradiance. Nodes that shared a mesh get meshes of their own. Materials and pictures that
+/// nothing shows any more stay; geometry goes. Equal arguments give equal bytes.
 ///
 /// # Errors
-/// As [`crate::read_scene`]. A surface whose instance has no origin is left out.
+/// As [`crate::read_scene`], and [`FormatError::Unsupported`] beyond the 4 GiB that such a file can hold. A surface whose
+/// instance has no origin is left out.
+///
+/// # Panics
+/// Never, whatever the bytes.
 pub fn write_lit_glb(
     name: &str,
     source: &[u8],
@@ -118,67 +135,99 @@ pub fn write_lit_glb(
     limits: &Limits,
     origins: &[Option<Origin>],
     lit: &Lit,
-) -> Result<Vec<u8>, FormatError> {
+) -> Result<LitGlb, FormatError> {
     let mut fetch = |path: &str| resolver(path);
     let mut context = Context::new(name, limits, &mut fetch);
+    context.check_size(source.len(), name)?;
+    context.budget.add_input(source.len());
     let (text, chunk) = container::split(name, source)?;
     let (original, _) = json::parse(&mut context, text)?;
     let root = Element::root(name, &original);
+    if !root.is_object() {
+        return Err(FormatError::invalid(name, "JSON", "no object", "a glTF 2.0 document"));
+    }
     let buffers = Buffers::load(&mut context, &root, chunk)?;
 
     let mut document = original.clone();
     let mut geometry = Geometry::new(&root, &buffers);
     let mut materials = Materials::new(&original, lit);
-    let mut extensions = BTreeSet::new();
-    // Nodes in order, of each the primitives that have surfaces.
-    let mut nodes: BTreeMap<usize, BTreeMap<usize, Vec<(&LitSurface, &Origin)>>> = BTreeMap::new();
+    let nodes = by_node(origins, lit);
+    let mut meshes = Meshes::new(&original, nodes.keys().copied());
+    for (&node, primitives) in &nodes {
+        let Some((_, first)) = primitives.values().flatten().next() else { continue };
+        let Some(mesh) = root.item("meshes", first.mesh).filter(Element::is_object) else { continue };
+        let Some(value) = document["nodes"].get_mut(node).and_then(Value::as_object_mut) else { continue };
+        let made = lit_mesh(&mut context, &mesh, primitives, &mut geometry, &mut materials)?;
+        value.insert("mesh".into(), json!(meshes.put(first.mesh, made)));
+    }
+    if !meshes.list.is_empty() {
+        document["meshes"] = Value::Array(meshes.list);
+    }
+    let extensions = materials.finish(&mut document, &mut geometry);
+    if lit.drop_lights {
+        drop_lights(&mut document);
+    }
+    if !lit.about.is_null() {
+        note(&mut context, &mut document["asset"], "asset", "twinray_bake", lit.about.clone());
+    }
+    list_extensions(&mut document, &extensions);
+    let bytes = tidy::finish(&mut context, &root, &buffers, document, geometry)?;
+    Ok(LitGlb { bytes, warnings: context.warnings.finish(name) })
+}
+
+/// Surfaces of a node by the number of the primitive that they replace.
+type Primitives<'a> = BTreeMap<usize, Vec<(&'a LitSurface, &'a Origin)>>;
+
+fn by_node<'a>(origins: &'a [Option<Origin>], lit: &'a Lit) -> BTreeMap<usize, Primitives<'a>> {
+    let mut nodes: BTreeMap<usize, Primitives<'a>> = BTreeMap::new();
     for surface in lit.surfaces.iter().filter(|s| !s.triangles.is_empty()) {
         if let Some(origin) = origins.get(surface.instance).and_then(Option::as_ref) {
             nodes.entry(origin.node).or_default().entry(origin.primitive).or_default().push((surface, origin));
         }
     }
-    let mut meshes = Meshes::new(&original, nodes.keys().copied());
-    for (node, primitives) in &nodes {
-        let Some((_, first)) = primitives.values().flatten().next() else { continue };
-        let Some(mesh) = original["meshes"].get(first.mesh) else { continue };
-        let mut lit_mesh = mesh.clone();
-        let mut list = Vec::new();
-        for (k, primitive) in mesh["primitives"].as_array().into_iter().flatten().enumerate() {
-            let Some(surfaces) = primitives.get(&k) else {
-                list.push(primitive.clone());
-                continue;
-            };
-            let element = root.item("meshes", first.mesh).and_then(|m| m.item("primitives", k));
-            let Some(element) = element else { continue };
-            for (surface, origin) in surfaces {
-                let material = primitive["material"].as_u64().map(|m| m as usize);
-                let moved = materials.uses_second_set(material);
-                let mut made = geometry.primitive(primitive, &element, surface, &origin.vertices, moved)?;
-                let second = made.moved_to;
-                if let Some(index) = materials.of(material, surface, second) {
-                    made.value["material"] = json!(index);
-                }
-                list.push(made.value);
-            }
+    nodes
+}
+
+/// The mesh as one node shows it.
+fn lit_mesh(
+    context: &mut Context<'_>,
+    mesh: &Element<'_>,
+    primitives: &Primitives<'_>,
+    geometry: &mut Geometry<'_, '_>,
+    materials: &mut Materials<'_>,
+) -> Result<Value, FormatError> {
+    // All primitives of a mesh share what is white.
+    let surfaces = primitives.values().flatten().map(|(surface, _)| *surface);
+    let irradiance = surfaces.flat_map(|s| &s.vertices).filter_map(|v| v.irradiance);
+    let scale = irradiance.map(|i| i.into_iter().fold(0.0, f32::max)).reduce(f32::max);
+    let mut list = Vec::new();
+    for (k, primitive) in mesh.items("primitives")?.enumerate() {
+        let Some(surfaces) = primitives.get(&k) else {
+            list.push(primitive.value().clone());
+            continue;
+        };
+        for (surface, origin) in surfaces {
+            let used = materials.uses_second_set(primitive.value());
+            let wanted = Wanted { surface, vertices: &origin.vertices, keeps_second_set: used, scale };
+            let (mut made, second) = geometry.primitive(context, &primitive, &wanted)?;
+            materials.assign(&mut made, surface, second);
+            list.push(made);
         }
-        lit_mesh["primitives"] = Value::Array(list);
-        if let Some(scale) = geometry.take_scale() {
-            lit_mesh["extras"]["twinray_irradiance_scale"] = json!(scale);
-        }
-        document["nodes"][*node]["mesh"] = json!(meshes.put(first.mesh, lit_mesh));
     }
-    if !meshes.list.is_empty() {
-        document["meshes"] = Value::Array(meshes.list);
+    let mut out = mesh.value().clone();
+    out["primitives"] = Value::Array(list);
+    if let Some(scale) = scale {
+        note(context, &mut out, &mesh.path, "twinray_irradiance_scale", json!(scale));
     }
-    materials.finish(&mut document, &mut geometry, &mut extensions);
-    if lit.drop_lights {
-        drop_lights(&mut document);
+    Ok(out)
+}
+
+/// Puts an extra beside those that are there.
+fn note(context: &mut Context<'_>, owner: &mut Value, path: &str, key: &str, value: Value) {
+    match object(owner, "extras") {
+        Some(extras) => drop(extras.insert(key.to_owned(), value)),
+        None => context.warn(format!("{path}.extras"), format!("no object: {key} has no place in it and is left out")),
     }
-    if !lit.about.is_null() {
-        document["asset"]["extras"]["twinray_bake"] = lit.about.clone();
-    }
-    list_extensions(&mut document, &extensions);
-    tidy::finish(&mut context, &root, &buffers, document, geometry)
 }
 
 /// Meshes of the document: those of lit nodes take the place of the original where every node that shows it is lit.
@@ -193,15 +242,16 @@ impl Meshes {
         let lit: BTreeSet<usize> = lit.collect();
         let mut free = vec![true; list.len()];
         for (k, node) in original["nodes"].as_array().into_iter().flatten().enumerate() {
-            if let Some(mesh) = node["mesh"].as_u64().filter(|_| !lit.contains(&k)) {
-                free[mesh as usize] = false;
+            let shown = index(&node["mesh"]).filter(|_| !lit.contains(&k));
+            if let Some(free) = shown.and_then(|mesh| free.get_mut(mesh)) {
+                *free = false;
             }
         }
         Self { list, free }
     }
 
     fn put(&mut self, original: usize, mesh: Value) -> usize {
-        if std::mem::take(&mut self.free[original]) {
+        if self.free.get_mut(original).is_some_and(std::mem::take) {
             self.list[original] = mesh;
             return original;
         }
@@ -222,7 +272,7 @@ fn drop_lights(document: &mut Value) {
             owner.remove("extensions");
         }
     };
-    document["nodes"].as_array_mut().into_iter().flatten().for_each(remove);
+    document.get_mut("nodes").and_then(Value::as_array_mut).into_iter().flatten().for_each(remove);
     remove(document);
     for key in ["extensionsUsed", "extensionsRequired"] {
         if let Some(list) = document.get_mut(key).and_then(Value::as_array_mut) {

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use super::super::container::Buffers;
-use super::super::json::Element;
+use super::super::json::{Element, index};
 use super::super::write::container;
-use super::geometry::{Geometry, is_fresh, references, walk_references};
+use super::geometry::Geometry;
+use super::references::{accessors_of, has_others, is_fresh, walk_accessors, walk_views};
 use crate::context::Context;
 use crate::error::FormatError;
 use crate::reference::{data_uri, percent_decode};
@@ -20,117 +21,106 @@ pub(super) fn finish(
     mut document: Value,
     mut geometry: Geometry<'_, '_>,
 ) -> Result<Vec<u8>, FormatError> {
-    colours(&mut document, &mut geometry);
-    embed_pictures(context, root, &mut document, &mut geometry)?;
-    accessors(&mut document, &mut geometry);
-    let binary = views(root, buffers, &mut document, geometry)?;
-    document["buffers"] = json!([{ "byteLength": binary.len() }]);
-    if binary.is_empty()
-        && let Some(document) = document.as_object_mut()
-    {
-        document.remove("buffers");
+    embed_pictures(context, root, &mut document, &mut geometry);
+    // Extensions that nobody here knows may refer to anything: then all that was there stays, under its number.
+    let keeps_all = has_others(root.value());
+    accessors(&mut document, std::mem::take(&mut geometry.accessors), keeps_all);
+    let binary = views(root, buffers, &mut document, geometry, keeps_all)?;
+    let buffer = (!binary.is_empty()).then(|| json!({ "byteLength": binary.len() }));
+    set(&mut document, "buffers", buffer.into_iter().collect());
+    let text = document.to_string().into_bytes();
+    // Both chunks, their headers, and what fills them up.
+    if (text.len() as u64).saturating_add(binary.len() as u64) > u64::from(u32::MAX) - 64 {
+        let hint = "Bake less of the scene into one file";
+        return Err(FormatError::unsupported(context.file, "file", "a .glb file beyond 4 GiB", hint));
     }
-    Ok(container(document.to_string().into_bytes(), binary))
+    Ok(container(text, binary))
 }
 
-/// Colours at vertices by the scale of their mesh.
-fn colours(document: &mut Value, geometry: &mut Geometry<'_, '_>) {
-    for mesh in document.get_mut("meshes").and_then(Value::as_array_mut).into_iter().flatten() {
-        let Some(scale) = mesh["extras"]["twinray_irradiance_scale"].as_f64() else { continue };
-        if let Some(primitives) = mesh["primitives"].as_array_mut() {
-            geometry.colours(primitives, scale as f32);
-        }
+/// An array of the document; glTF has none that are empty.
+fn set(document: &mut Value, key: &str, list: Vec<Value>) {
+    let Some(document) = document.as_object_mut() else { return };
+    match list.is_empty() {
+        true => drop(document.remove(key)),
+        false => drop(document.insert(key.to_owned(), Value::Array(list))),
     }
 }
 
-/// Pictures in files of their own become views.
+/// Pictures in files of their own become views; those that are not to be had keep their references.
 fn embed_pictures(
     context: &mut Context<'_>,
     root: &Element<'_>,
     document: &mut Value,
     geometry: &mut Geometry<'_, '_>,
-) -> Result<(), FormatError> {
-    for (k, image) in root.items("images")?.enumerate() {
-        let Some(uri) = image.text("uri")? else { continue };
-        let bytes = match data_uri(uri) {
-            Some(Ok(bytes)) => bytes,
-            Some(Err(detail)) => return Err(image.fault(detail, "base64 data")),
-            // A picture that is not there was a warning when the scene was read; the reference stays.
-            None => match context.fetch(&image.path, &percent_decode(uri)) {
-                Ok(bytes) => bytes.to_vec(),
-                Err(_) => continue,
-            },
-        };
-        let mime = match bytes.get(..12) {
-            Some([0x89, b'P', b'N', b'G', ..]) => "image/png",
-            Some([0xFF, 0xD8, ..]) => "image/jpeg",
-            Some([b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P']) => "image/webp",
-            Some([0xAB, b'K', b'T', b'X', ..]) => "image/ktx2",
-            _ => continue,
-        };
-        let view = geometry.view(json!({}), bytes);
-        let Some(out) = document["images"].get_mut(k).and_then(Value::as_object_mut) else { continue };
-        out.remove("uri");
-        out.insert("mimeType".into(), json!(mime));
-        out.insert("bufferView".into(), view);
-    }
-    Ok(())
-}
-
-/// New accessors take the places of those that nothing refers to any more. What is left over keeps its number, since
-/// extensions may refer to others, and loses its data.
-fn accessors(document: &mut Value, geometry: &mut Geometry<'_, '_>) {
-    let used = references(document);
-    let mut list = document["accessors"].as_array().cloned().unwrap_or_default();
-    let mut free: Vec<usize> = (0..list.len()).filter(|k| !used.contains_key(k)).rev().collect();
-    let mut number = Vec::new();
-    for accessor in geometry.accessors.drain(..) {
-        match free.pop() {
-            Some(k) => {
-                list[k] = accessor;
-                number.push(k);
+) {
+    for (k, out) in document.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten().enumerate() {
+        let (Some(image), Some(out)) = (root.item("images", k), out.as_object_mut()) else { continue };
+        let Some(uri) = out.get("uri").and_then(Value::as_str).map(str::to_owned) else { continue };
+        match picture(context, &image, &uri) {
+            Ok((bytes, mime, name)) => {
+                out.remove("uri");
+                if let Some(name) = name {
+                    out.entry("name").or_insert_with(|| json!(name));
+                }
+                out.insert("mimeType".into(), json!(mime));
+                out.insert("bufferView".into(), geometry.view(json!({}), bytes));
             }
-            None => {
-                list.push(accessor);
-                number.push(list.len() - 1);
-            }
+            Err(reason) => context.warn(&image.path, format!("{reason}: the reference stays")),
         }
-    }
-    while free.first().is_some_and(|&k| k + 1 == list.len()) {
-        free.remove(0);
-        list.pop();
-    }
-    for k in free {
-        if let Some(accessor) = list[k].as_object_mut() {
-            ["bufferView", "byteOffset", "sparse"].iter().for_each(|key| drop(accessor.remove(*key)));
-        }
-    }
-    walk_references(document, &mut |value| {
-        if let Some(index) = is_fresh(value) {
-            *value = json!(number[index]);
-        }
-    });
-    document["accessors"] = Value::Array(list);
-    if document["accessors"].as_array().is_some_and(Vec::is_empty)
-        && let Some(document) = document.as_object_mut()
-    {
-        document.remove("accessors");
     }
 }
 
-/// Views that are referred to, old ones first, and their bytes.
+/// The bytes of a picture, what they are, and the name of their file.
+fn picture(
+    context: &mut Context<'_>,
+    image: &Element<'_>,
+    uri: &str,
+) -> Result<(Vec<u8>, &'static str, Option<String>), String> {
+    let (bytes, name) = match data_uri(uri) {
+        Some(embedded) => (embedded?, None),
+        None => {
+            let name = percent_decode(uri);
+            (context.fetch(&image.path, &name).map_err(|error| error.without_place())?.to_vec(), Some(name))
+        }
+    };
+    let mime = match bytes.get(..12) {
+        Some([0x89, b'P', b'N', b'G', ..]) => "image/png",
+        Some([0xFF, 0xD8, ..]) => "image/jpeg",
+        Some([b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P']) => "image/webp",
+        Some([0xAB, b'K', b'T', b'X', ..]) => "image/ktx2",
+        _ => return Err("no PNG, JPEG, WebP or KTX2 picture".to_owned()),
+    };
+    Ok((bytes, mime, name))
+}
+
+/// Old accessors that are referred to, or all, then new ones.
+fn accessors(document: &mut Value, new: Vec<Value>, keeps_all: bool) {
+    let old = document["accessors"].as_array().cloned().unwrap_or_default();
+    let used = accessors_of(document);
+    let (mut list, mut number) = (Vec::new(), BTreeMap::new());
+    for (k, accessor) in old.into_iter().enumerate().filter(|(k, _)| keeps_all || used.contains(k)) {
+        number.insert(k, list.len());
+        list.push(accessor);
+    }
+    let first = list.len();
+    list.extend(new);
+    walk_accessors(document, &mut |value| renumber(value, first, &number));
+    set(document, "accessors", list);
+}
+
+/// Views that are referred to, or all, old ones first, and their bytes.
 fn views(
     root: &Element<'_>,
     buffers: &Buffers<'_>,
     document: &mut Value,
     geometry: Geometry<'_, '_>,
+    keeps_all: bool,
 ) -> Result<Vec<u8>, FormatError> {
     let mut used = BTreeSet::new();
-    walk_views(document, &mut |value| {
-        if let Some(index) = value.as_u64() {
-            used.insert(index as usize);
-        }
-    });
+    walk_views(document, &mut |value| used.extend(index(value)));
+    if keeps_all {
+        used.extend(0..root.count("bufferViews"));
+    }
     let (mut binary, mut list, mut number) = (Vec::new(), Vec::new(), BTreeMap::new());
     let mut add = |mut view: Value, bytes: &[u8]| {
         // Eight bytes suit every kind of component.
@@ -145,8 +135,8 @@ fn views(
     for &k in &used {
         let owner = json!({ "bufferView": k });
         let found = buffers.view(root, &Element::root(root.file(), &owner))?;
-        let (Some(found), Some(view)) = (found, document["bufferViews"].get(k)) else { continue };
-        let mut view = view.clone();
+        let (Some(found), Some(view)) = (found, root.item("bufferViews", k)) else { continue };
+        let mut view = view.value().clone();
         // Bytes that were packed by an extension of the view stand here as its fallback has them.
         if let Some(view) = view.as_object_mut() {
             view.remove("extensions");
@@ -157,37 +147,17 @@ fn views(
     for (view, bytes) in geometry.views {
         add(view, &bytes);
     }
-    walk_views(document, &mut |value| {
-        let place = match is_fresh(value) {
-            Some(index) => Some(first + index),
-            None => value.as_u64().and_then(|k| number.get(&(k as usize)).copied()),
-        };
-        if let Some(place) = place {
-            *value = json!(place);
-        }
-    });
-    document["bufferViews"] = Value::Array(list);
-    if document["bufferViews"].as_array().is_some_and(Vec::is_empty)
-        && let Some(document) = document.as_object_mut()
-    {
-        document.remove("bufferViews");
-    }
+    walk_views(document, &mut |value| renumber(value, first, &number));
+    set(document, "bufferViews", list);
+    // Chunks end at multiples of four bytes.
+    binary.resize(binary.len().next_multiple_of(4), 0);
     Ok(binary)
 }
 
-/// Calls `each` with every place that refers to a view, whatever it belongs to.
-fn walk_views(value: &mut Value, each: &mut dyn FnMut(&mut Value)) {
-    match value {
-        Value::Object(members) => {
-            for (key, member) in members.iter_mut() {
-                if key == "bufferView" {
-                    each(member);
-                } else if key != "extras" {
-                    walk_views(member, each);
-                }
-            }
-        }
-        Value::Array(items) => items.iter_mut().for_each(|v| walk_views(v, each)),
-        _ => {}
+/// The new number of something new, which follow those of `first` old ones, or of something old.
+fn renumber(value: &mut Value, first: usize, number: &BTreeMap<usize, usize>) {
+    let new = is_fresh(value).map(|k| first + k);
+    if let Some(place) = new.or_else(|| number.get(&index(value)?).copied()) {
+        *value = json!(place);
     }
 }
