@@ -289,9 +289,8 @@ fn unwrap(
     let mut laid: Vec<LaidPart> = Vec::with_capacity(parts.len());
     let dark = any_dark.then(|| dark_place(&found));
     for ((part, input), mesh) in parts.iter().zip(&inputs).zip(&found.meshes) {
-        let mut out = LaidPart::default();
-        out.vertices =
-            mesh.vertices.iter().map(|v| LaidVertex { source: input.sources[v.xref as usize], uv: v.uv }).collect();
+        let vertex = |v: &uvunwrap::OutputVertex| LaidVertex { source: input.sources[v.xref as usize], uv: v.uv };
+        let mut out = LaidPart { vertices: mesh.vertices.iter().map(vertex).collect(), ..LaidPart::default() };
         for (face, corners) in part.faces.iter().zip(mesh.indices.as_chunks::<3>().0) {
             let page = corners.iter().find_map(|&k| mesh.vertices[k as usize].page);
             let (Some(page), false) = (page, face.dark) else {

@@ -130,7 +130,7 @@ impl Seams {
             square += crossing.length * (a - b).powi(2);
             jumps.push(((a - b).abs(), crossing.length));
         }
-        if !(mean > 0.0) {
+        if mean <= 0.0 || mean.is_nan() {
             return SeamJump { length, ..SeamJump::default() };
         }
         mean /= length;

@@ -170,7 +170,7 @@ fn solve(
     let mut rest = dot(&residual, &z);
     let target = 1e-14 * rest;
     for _ in 0..STEPS {
-        if !(rest > target) {
+        if rest <= target || rest.is_nan() {
             break;
         }
         let image = held(apply(&direction));
