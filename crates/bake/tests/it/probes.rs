@@ -46,7 +46,7 @@ fn in_a_furnace_light_is_even() {
         sum += f64::from(light.0[0][1]) / scale / volume.radiance.len() as f64;
         for normal in normals(40) {
             let found = light.irradiance(normal).g / (PI * radiance);
-            assert!((found - 1.0).abs() < 0.02, "probe {probe}: {found}");
+            assert!((found - 1.0).abs() < 0.03, "probe {probe}: {found}");
         }
     }
     println!("mean of all probes: {sum:.5}");

@@ -13,6 +13,7 @@ mod limits;
 mod mutation;
 mod obj;
 mod pictures;
+mod probes;
 mod radiance_map;
 mod read_picture;
 mod real;
