@@ -19,7 +19,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let volume = bake_probes(&patches, &solver.solution(), &ProbeOptions { rays: 128, ..ProbeOptions::default() })?;
 
         let valid = volume.validity.iter().filter(|v| **v > 0.0).count();
-        println!("{name}: {:?} probes, {valid} in the open; irradiance (luminance) upwards and downwards:", volume.grid.counts);
+        println!(
+            "{name}: {:?} probes, {valid} in the open; irradiance (luminance) upwards and downwards:",
+            volume.grid.counts
+        );
         let [nx, ny, nz] = volume.grid.counts.map(|n| n as usize);
         for i in 0..nx {
             let probe = i + nx * (ny / 2 + ny * (nz / 2));

@@ -76,10 +76,17 @@ pub fn bake_probes(
             let mut sum = [Rgb::BLACK; HARMONICS];
             if place.validity > 0.0 {
                 let point = place.point - patches.centre();
-                gather.over_sphere(point, options.rays, options.punctual, options.seed, probe as u64, |towards, light| {
-                    let basis = twinray_render::walk::basis(towards);
-                    sum.iter_mut().zip(basis).for_each(|(s, b)| *s += light * b);
-                });
+                gather.over_sphere(
+                    point,
+                    options.rays,
+                    options.punctual,
+                    options.seed,
+                    probe as u64,
+                    |towards, light| {
+                        let basis = twinray_render::walk::basis(towards);
+                        sum.iter_mut().zip(basis).for_each(|(s, b)| *s += light * b);
+                    },
+                );
             }
             sum
         })

@@ -51,10 +51,12 @@ pub(super) fn place(patches: &PatchScene, solution: &Solution, grid: &ProbeGrid,
 /// Places beside the middle of a box, in boxes, nearest first.
 fn places() -> Vec<DVec3> {
     let range = -STEPS..=STEPS;
-    let all = range.clone().flat_map(|z| range.clone().flat_map({
-        let range = range.clone();
-        move |y| range.clone().map(move |x| [x, y, z])
-    }));
+    let all = range.clone().flat_map(|z| {
+        range.clone().flat_map({
+            let range = range.clone();
+            move |y| range.clone().map(move |x| [x, y, z])
+        })
+    });
     let mut steps: Vec<[i32; 3]> = all.filter(|s| *s != [0; 3]).collect();
     // Integers, so that equal distances keep their order.
     steps.sort_by_key(|s| s.iter().map(|c| c * c).sum::<i32>());

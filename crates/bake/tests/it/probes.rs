@@ -105,7 +105,8 @@ fn a_small_lamp_follows_the_cosine_law() {
             assert!((found - cosine.max(0.0)).abs() < 0.105, "{cosine}: {found}");
         }
         // Whoever lights objects with such lights by himself has them once.
-        let options = ProbeOptions { spacing: ProbeSpacing::Counts([5, 3, 2]), punctual: false, ..ProbeOptions::default() };
+        let options =
+            ProbeOptions { spacing: ProbeSpacing::Counts([5, 3, 2]), punctual: false, ..ProbeOptions::default() };
         let without = bake_probes(&patches, &solution, &options).expect("probes").radiance[probe];
         assert_eq!(without.0[0][0] > 0.0, with_area);
     }

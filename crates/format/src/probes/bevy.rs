@@ -91,10 +91,20 @@ fn container(size: [u32; 3], words: &[u8], pixels: &[u8]) -> Vec<u8> {
     let pixels_at = (words_at + words.len()).next_multiple_of(8);
     let mut bytes = b"\xABKTX 20\xBB\r\n\x1A\n".to_vec();
     let numbers = [
-        FORMAT, 2, size[0], size[1], size[2],
+        FORMAT,
+        2,
+        size[0],
+        size[1],
+        size[2],
         // No array, one face, one level, no supercompression.
-        0, 1, 1, 0,
-        descriptor_at as u32, descriptor.len() as u32, words_at as u32, words.len() as u32,
+        0,
+        1,
+        1,
+        0,
+        descriptor_at as u32,
+        descriptor.len() as u32,
+        words_at as u32,
+        words.len() as u32,
     ];
     bytes.extend(numbers.iter().flat_map(|n| n.to_le_bytes()));
     bytes.extend([0u64; 2].iter().flat_map(|n| n.to_le_bytes()));

@@ -23,10 +23,7 @@ pub fn write_probes_json(probes: &ProbeArrays<'_>, unit: &str, attributes: &[(&s
     let lattice = &probes.lattice;
     let provenance: serde_json::Map<String, serde_json::Value> =
         attributes.iter().map(|(name, text)| ((*name).to_owned(), (*text).into())).collect();
-    let steps: Vec<[i32; 3]> = (0..27)
-        .filter(|k| *k != 13)
-        .map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1])
-        .collect();
+    let steps: Vec<[i32; 3]> = (0..27).filter(|k| *k != 13).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]).collect();
     let mut text = String::from("{\n");
     let mut line = |name: &str, value: String| {
         text.push_str(&format!("  \"{name}\": {value},\n"));
@@ -39,7 +36,10 @@ pub fn write_probes_json(probes: &ProbeArrays<'_>, unit: &str, attributes: &[(&s
     line("low", json!(lattice.low));
     line("cell", json!(lattice.cell));
     line("counts", json!(lattice.counts));
-    line("order", json!("x fastest, then y, then z; probe (i, j, k) at low + (i + 1/2, j + 1/2, k + 1/2) cell + offset"));
+    line(
+        "order",
+        json!("x fastest, then y, then z; probe (i, j, k) at low + (i + 1/2, j + 1/2, k + 1/2) cell + offset"),
+    );
     line("harmonics", json!(["1", "y", "z", "x", "xy", "yz", "3z^2-1", "xz", "x^2-y^2"]));
     line("factors", json!(FACTORS));
     line("cosine", json!(["pi", "2pi/3", "2pi/3", "2pi/3", "pi/4", "pi/4", "pi/4", "pi/4", "pi/4"]));
@@ -62,5 +62,13 @@ pub fn write_probes_json(probes: &ProbeArrays<'_>, unit: &str, attributes: &[(&s
 
 /// What the polynomials of the harmonics are multiplied by, to single precision.
 const FACTORS: [f32; 9] = [
-    0.282_094_8, 0.488_602_5, 0.488_602_5, 0.488_602_5, 1.092_548_4, 1.092_548_4, 0.315_391_57, 1.092_548_4, 0.546_274_24,
+    0.282_094_8,
+    0.488_602_5,
+    0.488_602_5,
+    0.488_602_5,
+    1.092_548_4,
+    1.092_548_4,
+    0.315_391_57,
+    1.092_548_4,
+    0.546_274_24,
 ];

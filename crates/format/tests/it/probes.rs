@@ -60,9 +60,8 @@ impl Texture {
     fn bevy(&self, point: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let size = self.size.map(|n| n as f64);
         let resolution = [size[0], size[1] / 2.0, size[2] / 3.0];
-        let base: [f64; 3] = std::array::from_fn(|a| {
-            ((point[a] + 0.5) * resolution[a]).max(0.5).min(resolution[a] - 0.5) / size[a]
-        });
+        let base: [f64; 3] =
+            std::array::from_fn(|a| ((point[a] + 0.5) * resolution[a]).max(0.5).min(resolution[a] - 0.5) / size[a]);
         let mut sum = [0.0; 3];
         for axis in 0..3 {
             let below = if normal[axis] < 0.0 { 0.5 } else { 0.0 };
