@@ -50,9 +50,30 @@ pub fn write_exr_aovs(
     let expected = u64::from(width) * u64::from(height);
     assert_eq!(pixels.len() as u64, expected, "write_exr: {width}×{height} pixels were announced");
     assert!(expected > 0, "write_exr: a picture without pixels");
+    write_layer(width, height, channels(pixels, aovs), white_luminance, attributes)
+}
+
+/// The same of channels of any names, each `[height, width]`.
+pub(crate) fn write_channels(
+    width: u32,
+    height: u32,
+    channels: Vec<(String, Vec<f32>)>,
+    white_luminance: Option<f32>,
+    attributes: &[(&str, &str)],
+) -> Vec<u8> {
+    let channel = |(name, values): (String, Vec<f32>)| AnyChannel::new(name.as_str(), FlatSamples::F32(values));
+    write_layer(width, height, channels.into_iter().map(channel).collect(), white_luminance, attributes)
+}
+
+fn write_layer(
+    width: u32,
+    height: u32,
+    channels: Vec<AnyChannel<FlatSamples>>,
+    white_luminance: Option<f32>,
+    attributes: &[(&str, &str)],
+) -> Vec<u8> {
     let size = Vec2(width as usize, height as usize);
-    let channels = channels(pixels, aovs);
-    let fits = |c: &AnyChannel<FlatSamples>| c.sample_data.len() == pixels.len();
+    let fits = |c: &AnyChannel<FlatSamples>| c.sample_data.len() == size.area();
     assert!(channels.iter().all(fits), "write_exr: an output variable has not {width}×{height} pixels");
     let channels = AnyChannels::sort(channels.into_iter().collect());
     let mut layer = Layer::new(size, LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);

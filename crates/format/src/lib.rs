@@ -1,4 +1,4 @@
-//! Bytes to twinray's types and back, for every file kind: glTF 2.0 and OBJ scenes, PNG, EXR and KTX2 pictures.
+//! Bytes to twinray's types and back, for every file kind: glTF 2.0 and OBJ scenes, PNG, EXR and KTX2 pictures, irradiance volumes.
 //!
 //! Lives here: [`read_scene`] and the writers, one module per file kind, the [`Limits`] hostile bytes run into,
 //! and the two lists a reader answers with, [`FormatError`] and [`Warning`]. Not here: paths and the disk. The
@@ -25,6 +25,7 @@ mod limits;
 mod obj;
 mod picture;
 mod png;
+mod probes;
 mod radiance;
 mod read;
 mod reference;
@@ -43,6 +44,9 @@ pub use crate::limits::Limits;
 pub use crate::obj::{ObjFiles, write_obj};
 pub use crate::picture::{PictureFile, read_picture};
 pub use crate::png::{write_png, write_png_rgba};
+pub use crate::probes::{
+    BevyVolumeError, ProbeArrays, ProbeLattice, write_bevy_volume, write_probes_exr, write_probes_json,
+};
 pub use crate::radiance::read_radiance_map;
 pub use crate::read::{Origin, Reading, Resolver, read_scene};
 pub use crate::twin::{Method, Provenance, SceneSource, SolutionFile, StoredSolution, read_solution, write_solution};

@@ -24,7 +24,7 @@ pub mod walk;
 pub use aovs::{AovOptions, Aovs, aovs};
 pub use display::{Exposure, PhysicalCamera, ToneCurve, WhiteBalance};
 pub use film::Crop;
-pub use gather::{Gather, GatherOptions, IrradianceGather};
+pub use gather::{Gather, GatherOptions, IrradianceGather, RadianceGather};
 pub use image::Image;
 pub use picture::{Lobes, Picture, PictureOptions, render};
 pub use reconstruct::{Reconstruction, Smooth, Surfaces};

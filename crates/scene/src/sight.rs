@@ -37,6 +37,15 @@ impl PatchScene {
         self.through_panes(point, towards, hit, f64::INFINITY)
     }
 
+    /// The same for a free point, above no surface.
+    pub fn transmittance_from_sky_to(&self, point: DVec3, towards: DVec3) -> Rgb {
+        let hit = self.trace(point, towards);
+        if !self.has_clear_glass() {
+            return if hit.is_none() { Rgb::WHITE } else { Rgb::BLACK };
+        }
+        self.through_panes(point, towards, hit, f64::INFINITY)
+    }
+
     /// What panes let through up to parameter `end` of a ray whose first hit is known.
     fn through_panes(&self, origin: DVec3, direction: DVec3, first: Option<SurfaceHit>, end: f64) -> Rgb {
         let length = direction.length();

@@ -1,5 +1,6 @@
 //! Tests of the whole crate.
 
 mod lightmap;
+mod probes;
 mod scenes;
 mod vertices;

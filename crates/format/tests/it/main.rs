@@ -15,6 +15,7 @@ mod lit;
 mod mutation;
 mod obj;
 mod pictures;
+mod probes;
 mod radiance_map;
 mod read_picture;
 mod real;

@@ -6,12 +6,14 @@
 //! patches to look even, its end is a point like the first. No patch is seen directly: shadows and textures are sharp,
 //! and only light of two bounces and more is as smooth as patches are.
 //! `sample` follows one camera ray; `tile` lets neighbours share what their gather rays find; `places` learn which lamps
-//! light them, and with `guide` from where light comes; `spread` gives to many what was too much for one; `pass` decides how many rays each place gets. `irradiance` asks at points of surfaces instead.
+//! light them, and with `guide` from where light comes; `spread` gives to many what was too much for one; `pass` decides how many rays each place gets. `irradiance` asks at points of surfaces instead,
+//! `radiance` at points in free space.
 
 mod guide;
 mod irradiance;
 mod pass;
 mod places;
+mod radiance;
 mod sample;
 mod spread;
 mod tile;
@@ -26,6 +28,7 @@ use places::Places;
 use sample::Estimator;
 
 pub use irradiance::IrradianceGather;
+pub use radiance::RadianceGather;
 
 /// Settings of a gather.
 #[derive(Clone, Copy, Debug)]

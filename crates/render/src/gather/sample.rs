@@ -155,7 +155,7 @@ impl<'a> Estimator<'a> {
 
     /// Light straight from what emits that a point reflects to the eye, and the lamp that it comes from.
     pub fn lit(&self, point: &Point, shadows: Shadows, numbers: &mut PixelSample) -> (Rgb, Option<usize>) {
-        numbers.jump(PAIRS * u64::from(MOST_MET + 1));
+        Self::jump_to_shadow_rays(numbers);
         let Point { vertex, aim, throughput, .. } = point;
         let own = |towards| aim.pdf(towards);
         let (light, lamp) = direct(self.scene, &self.lights, vertex, &aim.brdf, own, shadows, || numbers.pair());
@@ -174,14 +174,30 @@ impl<'a> Estimator<'a> {
             Gathered { direction, density, emitted: Rgb::BLACK, lamp: None, scattered: None, other: Rgb::BLACK };
         let before =
             Before { point: point.vertex.point, heading: direction, density, distance: 0.0, lit: Some(shadows) };
-        self.follow(&point.vertex, before, direction, numbers, &mut gathered);
+        self.follow(Some(point.vertex), before, direction, numbers, &mut gathered);
         Some(gathered)
     }
 
-    /// Follows a path from `vertex`, which scattered it into `direction`, and adds up the radiance that comes back.
+    /// Radiance that arrives at a free point from `direction`, which was chosen with `density` per solid angle among rays
+    /// that have a shadow ray each.
+    pub fn arriving(&self, point: DVec3, direction: DVec3, density: f64, numbers: &mut PixelSample) -> Rgb {
+        let mut gathered =
+            Gathered { direction, density, emitted: Rgb::BLACK, lamp: None, scattered: None, other: Rgb::BLACK };
+        let before = Before { point, heading: direction, density, distance: 0.0, lit: Some(self.shadows()) };
+        self.follow(None, before, direction, numbers, &mut gathered);
+        gathered.emitted + gathered.scattered.map_or(Rgb::BLACK, |s| s.0) + gathered.other
+    }
+
+    /// Draws on from the pairs of shadow rays.
+    pub fn jump_to_shadow_rays(numbers: &mut PixelSample) {
+        numbers.jump(PAIRS * u64::from(MOST_MET + 1));
+    }
+
+    /// Follows a path from `vertex`, which scattered it into `direction`, or without one from the free point before, and
+    /// adds up the radiance that comes back.
     fn follow(
         &self,
-        vertex: &Vertex,
+        vertex: Option<Vertex>,
         before: Before<'_>,
         direction: DVec3,
         numbers: &mut PixelSample,
@@ -190,14 +206,18 @@ impl<'a> Estimator<'a> {
         let scene = self.scene;
         let own = self.shadows();
         let (mut before, mut direction, mut throughput) = (before, direction, Rgb::WHITE);
-        let (mut from, mut beyond) = (*vertex, false);
+        let (mut from, mut beyond) = (vertex, false);
         let (mut count, mut medium) = (1, None);
         // Whatever is found behind the first surface is its scattered light, if it scatters at all.
         let mut first: Option<(DVec3, DVec3)> = None;
         let mut radiance = Rgb::BLACK;
         for met in 0..MOST_MET {
             numbers.jump(PAIRS * u64::from(MOST_MET + 2 + met));
-            let Some(hit) = from.next(scene, beyond, direction) else {
+            let met_next = match &from {
+                Some(vertex) => vertex.next(scene, beyond, direction),
+                None => scene.trace(before.point, direction),
+            };
+            let Some(hit) = met_next else {
                 if let Some(sky) = scene.environment() {
                     let weight = self.weight(&before, direction, |by| self.lights.sky_density_by(by.choice, direction));
                     let light = throughput * sky.radiance(direction) * weight;
@@ -262,7 +282,7 @@ impl<'a> Estimator<'a> {
             if throughput.is_black() {
                 break;
             }
-            from = vertex;
+            from = Some(vertex);
         }
         match first {
             Some((point, normal)) => gathered.scattered = Some((radiance, point, normal)),
