@@ -46,7 +46,7 @@ const OUTSIDE: [&str; 11] = [
 ];
 
 /// The documents whose links and names are checked.
-const DOCUMENTS: [&str; 8] = [
+const DOCUMENTS: [&str; 9] = [
     "README.md",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
@@ -55,6 +55,7 @@ const DOCUMENTS: [&str; 8] = [
     "docs/validation.md",
     "docs/performance.md",
     "docs/scale.md",
+    "docs/check.md",
 ];
 
 /// The root of the workspace.

@@ -15,6 +15,8 @@ use crate::geom::{Frame, area_vector_2};
 const APART: f64 = 1e-4;
 /// Share of the smaller triangle that must be there twice.
 const SHARE: f64 = 0.01;
+/// Share of an instance's area that is worth a warning.
+const LITTLE: f64 = 1e-3;
 /// Cosine between planes that are one.
 const PARALLEL: f64 = 1.0 - 1e-6;
 
@@ -44,11 +46,12 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
     for t in subject.triangles().filter(|&t| doubled[t as usize] > SHARE * size[t as usize].powi(2)) {
         triangles[subject.instance_of(t)].push(t);
     }
-    let of_instance = |(i, triangles): (usize, Vec<u32>)| {
+    let of_instance = |i: usize| -> Vec<u32> { subject.triangles().filter(|&t| subject.instance_of(t) == i).collect() };
+    let finding = |(i, triangles): (usize, Vec<u32>)| {
         let twice: f64 = triangles.iter().map(|&t| doubled[t as usize]).sum();
         (!triangles.is_empty()).then(|| Finding {
             kind: Kind::CoplanarDuplicates,
-            severity: Severity::Warning,
+            severity: if twice < LITTLE * subject.area(&of_instance(i)) { Severity::Note } else { Severity::Warning },
             element: subject.instance_element(i),
             count: triangles.len(),
             area: twice,
@@ -60,7 +63,7 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
             triangles,
         })
     };
-    triangles.into_iter().enumerate().filter_map(of_instance).collect()
+    triangles.into_iter().enumerate().filter_map(finding).collect()
 }
 
 /// Area that two triangles have in common, if they lie in one plane, face one way, and can be seen.

@@ -1,6 +1,6 @@
 //! Bodies that are closed but for small holes.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
@@ -77,25 +77,48 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
         if holes.is_empty() || rim > RIM * diagonal {
             return None;
         }
-        let mut triangles: Vec<u32> = holes.iter().map(|h| h.0).collect();
-        triangles.dedup();
         let is_room = diagonal > ROOM * subject.diagonal();
-        Some(Finding {
-            kind: Kind::OpenShell,
-            severity: if is_room { Severity::Warning } else { Severity::Note },
-            element: subject.instance_element(subject.instance_of(holes[0].0)),
-            count: holes.len(),
-            area: subject.area(&triangles),
-            worst: Worst { value: rim, unit: "m" },
-            message: format!(
-                "{} open edges, {rim:.4} m in all, in a body of {} triangles and {diagonal:.3} m that is closed otherwise",
-                holes.len(),
-                body.triangles.len()
-            ),
-            triangles,
-        })
+        Some((subject.instance_of(holes[0].0), Holes { edges: holes, rim, bodies: 1, is_room }))
     };
-    bodies.into_iter().filter_map(of_one).collect()
+    let mut of_instance: BTreeMap<usize, Holes> = BTreeMap::new();
+    for (instance, holes) in bodies.into_iter().filter_map(of_one) {
+        let all = of_instance.entry(instance).or_default();
+        all.edges.extend(holes.edges);
+        (all.rim, all.bodies, all.is_room) = (all.rim + holes.rim, all.bodies + 1, all.is_room | holes.is_room);
+    }
+    of_instance.into_iter().map(|(instance, holes)| finding(subject, instance, &holes)).collect()
+}
+
+/// Open edges of the bodies of one instance.
+#[derive(Default)]
+struct Holes {
+    edges: Vec<(u32, u8)>,
+    /// Length of all of them, metres.
+    rim: f64,
+    bodies: usize,
+    /// Whether one of the bodies encloses much of the scene.
+    is_room: bool,
+}
+
+fn finding(subject: &Subject, instance: usize, holes: &Holes) -> Finding {
+    let mut triangles: Vec<u32> = holes.edges.iter().map(|h| h.0).collect();
+    triangles.sort_unstable();
+    triangles.dedup();
+    Finding {
+        kind: Kind::OpenShell,
+        severity: if holes.is_room { Severity::Warning } else { Severity::Note },
+        element: subject.instance_element(instance),
+        count: holes.edges.len(),
+        area: subject.area(&triangles),
+        worst: Worst { value: holes.rim, unit: "m" },
+        message: format!(
+            "{} open edges, {:.4} m in all, in bodies that are closed otherwise ({} of them)",
+            holes.edges.len(),
+            holes.rim,
+            holes.bodies
+        ),
+        triangles,
+    }
 }
 
 /// Triangles that hang together by their edges.
