@@ -46,7 +46,7 @@ const OUTSIDE: [&str; 11] = [
 ];
 
 /// The documents whose links and names are checked.
-const DOCUMENTS: [&str; 9] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
@@ -56,6 +56,7 @@ const DOCUMENTS: [&str; 9] = [
     "docs/performance.md",
     "docs/scale.md",
     "docs/bake.md",
+    "docs/check.md",
 ];
 
 /// The root of the workspace.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
+use twinray::scene::check::Kind;
 
 use crate::display::DisplayArgs;
 use crate::light_args::LightArgs;
@@ -14,7 +15,7 @@ use crate::light_args::LightArgs;
     furnace, plates, cube, cornell, cornell-closed, doorway, hall, hall-diffuse, \
     uneven, uneven-glowing.\n\
     A .twin file, the light of a scene as `solve` keeps it, stands for its scene.\n\
-    Exit codes: 0 done, 1 the limit of compare exceeded, 2 bad input, 130 (Ctrl-C), 143 (SIGTERM) or 129 (a closed terminal) interrupted with \
+    Exit codes: 0 done, 1 the limit of compare exceeded or something found by check, 2 bad input, 130 (Ctrl-C), 143 (SIGTERM) or 129 (a closed terminal) interrupted with \
     the result kept.")]
 pub struct Args {
     /// What to do.
@@ -35,6 +36,8 @@ pub enum Command {
     Reference(ReferenceArgs),
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
+    /// Find what ruins a bake before it is paid for: units, flipped normals, leaks, unwrapping, and more
+    Check(Box<CheckArgs>),
     /// Write the light of every patch as a table or a mesh for other programs, or a walk-through as one HTML file
     Export(ExportArgs),
     /// Bake the light of a scene into it: glTF with lightmaps, light at vertices, or probes for what moves
@@ -378,6 +381,50 @@ pub struct InfoArgs {
     pub load: LoadArgs,
 }
 
+/// `twinray check`.
+#[derive(Debug, clap::Args)]
+pub struct CheckArgs {
+    /// Scene and patches.
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Camera.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Picture to write: .png, the scene in grey, what was found in colours
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// What the picture shows [default: all findings]
+    #[arg(long, value_enum, requires = "picture")]
+    pub show: Option<ShowArg>,
+    /// Size of the picture in pixels [default: 512 high, as wide as the camera asks]
+    #[arg(long, value_name = "WxH", value_parser = size, requires = "picture")]
+    pub size: Option<(u32, u32)>,
+    /// Texels for a metre that a lightmap is to have: says how many that makes, and which meshes have too few
+    #[arg(long, value_name = "N", value_parser = density, allow_negative_numbers = true)]
+    pub density: Option<f64>,
+    /// Side of a lightmap, texels
+    #[arg(long, value_name = "N", default_value = "1024", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub texture_size: u32,
+    /// Kinds that do not count, such as uv2-padding,bright-albedo
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = kind)]
+    pub allow: Vec<Kind>,
+}
+
+/// What a picture of findings shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ShowArg {
+    /// Flipped normals.
+    Flipped,
+    /// Overlaps on the lightmap and in space.
+    Overlap,
+    /// Texels for a metre, in false colours, and the texels as a chequered pattern.
+    Density,
+    /// Bright albedo.
+    Albedo,
+    /// Leaks and open shells.
+    Leak,
+}
+
 /// `twinray export`.
 #[derive(Debug, clap::Args)]
 pub struct ExportArgs {
@@ -685,6 +732,12 @@ fn max_error(text: &str) -> Result<MaxError, String> {
     let value = digits.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
     let value = value.ok_or("expected a limit such as 2% or 0.02, at least 0")?;
     Ok(MaxError { value: if percent { value / 100.0 } else { value }, percent })
+}
+
+/// A kind of finding.
+fn kind(text: &str) -> Result<Kind, String> {
+    let known = || Kind::ALL.map(Kind::id).join(", ");
+    Kind::ALL.into_iter().find(|k| k.id() == text.trim()).ok_or_else(|| format!("expected of {}", known()))
 }
 
 fn triple(text: &str) -> Result<[f64; 3], String> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use twinray::format::{self, Limits, PictureFile, SceneSource};
-use twinray::scene::complete::complete;
+use twinray::scene::complete::{choose_camera, complete};
 use twinray::scene::{Camera, CameraAnimation, PatchBudget, PatchOptions, PatchScene, Projection, Scene, builtin};
 
 use crate::args::{LoadArgs, ReadArgs, ViewArgs};
@@ -173,6 +173,59 @@ fn load_stored(args: &LoadArgs, view: Option<&ViewArgs>, work: &Work) -> anyhow:
     Ok(Loaded { stored: Some(stored), ..loaded })
 }
 
+/// A scene as its author and the options of light made it, cut, with nothing added: what a check looks at.
+#[derive(Debug)]
+pub struct Authored {
+    /// The scene.
+    pub scene: Scene,
+    /// Its patches.
+    pub patches: PatchScene,
+    /// Cameras of the file; before them, the one that options describe; one that was chosen where there is none.
+    pub cameras: Vec<Camera>,
+    /// The camera to look through.
+    pub view: Camera,
+    /// What was ignored or changed in reading.
+    pub warnings: Vec<String>,
+}
+
+/// Loads a scene to be checked: without the camera and the lamps that other commands add where there are none.
+pub fn load_authored(args: &LoadArgs, view: &ViewArgs) -> anyhow::Result<Authored> {
+    let name = args.scene.as_str();
+    if stored::is_solution(name) {
+        bail!("{name}: is the light of a scene; expected the scene itself, a .glb, .gltf or .obj file");
+    }
+    let metres = args.unit.unwrap_or_default().metres();
+    let (mut scene, mut warnings) = read(name, &args.read)?;
+    scale(&mut scene, metres);
+    let lit = LightSettings::new(&args.light)?.apply(&mut scene, &limits(&args.read))?;
+    warnings.extend(lit.into_iter().map(|w| format!("{name}: {w}")));
+    let wanted = override_camera(&scene.cameras, view, metres)?;
+    let options = PatchOptions { budget: budget(args.patches, args.patch_size, &scene), two_sided: args.two_sided };
+    let work = Work { is_silent: true, ..Work::default() };
+    let expected = estimate::expect(args, &scene, options, &work)?;
+    warnings.extend(estimate::announce(args, &expected, &work));
+    let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
+    let mut cameras = scene.cameras.clone();
+    if cameras.is_empty() && wanted.is_none() {
+        cameras.push(choose_camera(&patches));
+    }
+    let view = match &wanted {
+        Some(camera) => camera.clone(),
+        None => pick_camera(&cameras, view.camera.as_deref())?.clone(),
+    };
+    cameras.splice(0..0, wanted);
+    Ok(Authored { scene, patches, cameras, view, warnings })
+}
+
+/// How finely to cut: as options say, or as the scene suggests.
+fn budget(patches: Option<u64>, patch_size: Option<f64>, scene: &Scene) -> PatchBudget {
+    match (patches, patch_size) {
+        (Some(n), _) => PatchBudget::Count(n as usize),
+        (None, Some(size)) => PatchBudget::Size(size),
+        (None, None) => PatchBudget::Count(scene.suggested_patches.unwrap_or(DEFAULT_PATCHES)),
+    }
+}
+
 /// Reads a scene, completes it and cuts it. A wanted camera may be lit by a lamp of its own, where there is no light, unless
 /// the patches are `known`: then there are about so many.
 fn cut(
@@ -189,11 +242,7 @@ fn cut(
     warnings.extend(lit.into_iter().map(|w| format!("{}: {w}", source.file)));
     let wanted = view.map(|v| override_camera(&scene.cameras, v, source.metres_per_unit)).transpose()?.flatten();
     let name = source.file.as_str();
-    let budget = match (source.patches, source.patch_size) {
-        (Some(n), _) => PatchBudget::Count(n as usize),
-        (None, Some(size)) => PatchBudget::Size(size),
-        (None, None) => PatchBudget::Count(scene.suggested_patches.unwrap_or(DEFAULT_PATCHES)),
-    };
+    let budget = budget(source.patches, source.patch_size, &scene);
     let options = PatchOptions { budget, two_sided: source.two_sided };
     let expected = estimate::expect(args, &scene, options, work)?;
     // Whatever a file says of how its scene was cut, it must not cost more than the file itself did. Completing adds few.

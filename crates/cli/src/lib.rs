@@ -63,6 +63,7 @@ fn command(command: args::Command, peers: Option<&dyn Peers>) -> anyhow::Result<
         args::Command::Reference(args) => commands::reference::run(&args),
         args::Command::Bake(args) => commands::bake::run(&args),
         args::Command::View(args) => commands::view::run(&args),
+        args::Command::Check(args) => commands::check::run(&args),
         args::Command::Info(args) => commands::info::run(&args),
         args::Command::Export(args) => commands::export::run(&args),
         args::Command::Compare(args) => commands::compare::run(&args),

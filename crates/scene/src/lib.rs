@@ -8,6 +8,7 @@ mod bvh;
 pub mod camera;
 pub mod camera_path;
 pub mod cells;
+pub mod check;
 pub mod complete;
 pub mod environment;
 mod estimate;

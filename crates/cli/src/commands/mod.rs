@@ -1,6 +1,8 @@
 //! One file a verb.
 
 pub mod bake;
+pub mod check;
+mod check_picture;
 pub mod compare;
 mod compare_pictures;
 mod compare_solutions;

@@ -5,6 +5,7 @@
 mod accuracy;
 mod bake;
 mod built_in;
+mod check;
 mod compare;
 mod completion;
 mod display;
