@@ -400,7 +400,7 @@ pub struct CheckArgs {
     #[arg(long, value_name = "WxH", value_parser = size, requires = "picture")]
     pub size: Option<(u32, u32)>,
     /// Texels for a metre that a lightmap is to have: says how many that makes, and which meshes have too few
-    #[arg(long, value_name = "N", value_parser = density, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     pub density: Option<f64>,
     /// Side of a lightmap, texels
     #[arg(long, value_name = "N", default_value = "1024", value_parser = clap::value_parser!(u32).range(1..=65536))]
@@ -470,7 +470,8 @@ pub struct BakeArgs {
     /// Solver.
     #[command(flatten)]
     pub solve: SolveArgs,
-    /// File to write: .glb [default: SCENE-lit.glb in this folder]. Lightmaps that lie beside it take its name
+    /// File to write: .glb [default: SCENE-lit.glb in this folder]; lightmaps that lie beside it take its name. With --to
+    /// probes .json, .exr, or .ktx2 as Bevy reads it [default: SCENE-probes.json]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// What carries the light [default: lightmap]
@@ -480,7 +481,7 @@ pub struct BakeArgs {
     #[arg(long = "for", value_name = "ENGINE", value_enum)]
     pub engine: Option<EngineArg>,
     /// Texels for a metre, on as many pages as it takes [default: as many as one page holds]
-    #[arg(long, value_name = "TEXELS_PER_METRE", value_parser = density, allow_negative_numbers = true)]
+    #[arg(long, value_name = "TEXELS_PER_METRE", value_parser = above_zero, allow_negative_numbers = true)]
     pub density: Option<f64>,
     /// Side of a page, texels, at most [default: 1024, or 2048 with --density]
     #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(64..=8192))]
@@ -494,6 +495,12 @@ pub struct BakeArgs {
     /// Of --quality high: rays that each texel gathers with
     #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub texel_rays: u32,
+    /// Of --to probes: how far they are apart, at most [default: a metre, less in small scenes]
+    #[arg(long, value_name = "METRES", value_parser = above_zero, allow_negative_numbers = true)]
+    pub spacing: Option<f64>,
+    /// Of --to probes: rays of each
+    #[arg(long, value_name = "N", default_value = "512", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub probe_rays: u32,
     /// Lay out new texture coordinates even where the scene's second set is sound
     #[arg(long)]
     pub unwrap: bool,
@@ -546,13 +553,9 @@ pub enum QualityArg {
     High,
 }
 
-fn density(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "expected a number of texels per metre, such as 20".to_owned())?;
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err("expected a positive number of texels per metre".into())
-    }
+fn above_zero(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number, such as 20".to_owned())?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("expected a positive number".into()) }
 }
 
 /// `twinray view`.

@@ -107,6 +107,25 @@ fn engines_get_what_they_load() {
     assert!(vertex["meshes"][0]["extras"]["twinray_irradiance_scale"].as_f64().unwrap() > 0.0);
 }
 
+/// A grid of probes in every kind of file, and the numbers of the one that is read most easily.
+#[test]
+fn probes_are_written_as_asked() {
+    for extension in ["json", "exr", "ktx2"] {
+        let place = Place::new();
+        let file = format!("p.{extension}");
+        let args = ["bake", "doorway", "--to", "probes", "-o", &file, "--spacing", "2", "--probe-rays", "16", "--json"];
+        let report = place.done(&[&args[..], &TINY[..]].concat()).json();
+        assert_eq!(place.files(), std::slice::from_ref(&file));
+        let counts: Vec<u64> =
+            report["bake"]["layout"]["counts"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
+        assert!(counts.iter().all(|n| *n >= 1) && counts.iter().product::<u64>() >= 8, "{counts:?}");
+        if extension == "json" {
+            let volume: Value = serde_json::from_slice(&place.read(&file)).unwrap();
+            assert!(volume.is_object());
+        }
+    }
+}
+
 /// Lights that are baked leave the file unless they are to stay.
 #[test]
 fn baked_lights_leave() {
@@ -147,9 +166,10 @@ fn what_makes_no_sense_is_refused() {
     let place = Place::new();
     for (args, expected) in [
         (&["bake", "cornell", "-o", "lit.png"][..], ".glb"),
-        (&["bake", "cornell", "--density", "0"], "texels per metre"),
+        (&["bake", "cornell", "--density", "0"], "a positive number"),
         (&["bake", "cornell", "--exposure", "1"], "--for unlit"),
         (&["bake", "cornell", "--to", "vertex", "--for", "unlit"], "leave one"),
+        (&["bake", "cornell", "--to", "probes", "-o", "p.glb"], ".json"),
         (&["bake", "no-such.glb"], "no such file"),
     ] {
         let run = place.run(args);

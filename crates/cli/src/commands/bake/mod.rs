@@ -2,6 +2,7 @@
 
 mod document;
 mod flavours;
+mod probes;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -36,8 +37,8 @@ const PAGE: [u32; 2] = [2048, 1024];
 /// Runs the command.
 pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     let name = args.load.scene.as_str();
-    let path = args.output.clone().unwrap_or_else(|| default_output(name));
     let carrier = args.to.unwrap_or_default();
+    let path = args.output.clone().unwrap_or_else(|| default_output(name, carrier));
     check(args, carrier, &path)?;
     commands::set_threads(args.load.threads);
     interrupt::install();
@@ -49,7 +50,10 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     let Some(scene) = loaded.scene.take() else { unreachable!("it was asked for") };
     let mut output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
-    let document = Document::of(&loaded, &scene, &args.load.read)?;
+    let document = match carrier {
+        CarrierArg::Probes => None,
+        _ => Some(Document::of(&loaded, &scene, &args.load.read)?),
+    };
 
     let mut interrupted = false;
     let mut settings = None;
@@ -69,24 +73,30 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     loaded.warnings.extend(loss);
     let solving_seconds = start.elapsed().as_secs_f64();
 
-    let baked = bake(args, carrier, &loaded, &scene, &solution, &path, interrupted).map_err(|e| match e {
-        AtlasError::Cancelled(_) => anyhow!("{name}: stopped before anything could be written"),
-        other => anyhow!("{name}: {other}"),
-    })?;
-    let left_out = baked.surfaces.iter().filter(|s| document.origins[s.instance].is_none()).count();
-    if left_out > 0 {
-        let warning =
-            format!("{name}: {left_out} surfaces that a transform squashes flat keep their look, without light");
-        commands::print_warnings(std::slice::from_ref(&warning), args.load.quiet);
-        loaded.warnings.push(warning);
-    }
-    let about = about(&scene, &loaded, &solution, settings, &baked);
-    let lit =
-        Lit { surfaces: baked.surfaces, pages: baked.pages, drop_lights: !args.keep_lights, about: about.clone() };
-    let LitGlb { bytes, warnings } = document.lit(&lit, &args.load.read)?;
-    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    commands::print_warnings(&warnings, args.load.quiet);
-    loaded.warnings.extend(warnings);
+    let mut baked = match carrier {
+        CarrierArg::Probes => Baked::default(),
+        _ => bake(args, carrier, &loaded, &scene, &solution, &path, interrupted).map_err(|e| match e {
+            AtlasError::Cancelled(_) => anyhow!("{name}: stopped before anything could be written"),
+            other => anyhow!("{name}: {other}"),
+        })?,
+    };
+    let (bytes, about) = match &document {
+        None => {
+            let (bytes, facts, line) = probes::bake(args, &loaded, &solution, &path)?;
+            (baked.facts, baked.words) = (facts, vec![line]);
+            (bytes, about(&scene, &loaded, &solution, settings, &baked))
+        }
+        Some(document) => {
+            let about = about(&scene, &loaded, &solution, settings, &baked);
+            let (surfaces, pages) = (std::mem::take(&mut baked.surfaces), std::mem::take(&mut baked.pages));
+            let lit = Lit { surfaces, pages, drop_lights: !args.keep_lights, about: about.clone() };
+            let LitGlb { bytes, warnings } = document.lit(&lit, &args.load.read)?;
+            let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+            commands::print_warnings(&warnings, args.load.quiet);
+            loaded.warnings.extend(warnings);
+            (bytes, about)
+        }
+    };
     for (path, bytes) in &baked.files {
         Output::open(path)?.write(bytes)?;
     }
@@ -122,8 +132,14 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
 /// What cannot be asked for, before anything is done.
 fn check(args: &BakeArgs, carrier: CarrierArg, path: &Path) -> anyhow::Result<()> {
     let name = &args.load.scene;
-    if extension(path) != "glb" {
-        bail!("{}: expected a name that ends in .glb", path.display());
+    match carrier {
+        CarrierArg::Probes if !probes::can_be(path) => {
+            bail!("{}: expected a name that ends in .json, .exr or .ktx2", path.display())
+        }
+        CarrierArg::Lightmap | CarrierArg::Vertex if extension(path) != "glb" => {
+            bail!("{}: expected a name that ends in .glb", path.display())
+        }
+        _ => {}
     }
     if stored::is_solution(name)
         && (args.solve.rays.is_some() || args.solve.time.is_some() || args.solve.error.is_some())
@@ -141,10 +157,13 @@ fn check(args: &BakeArgs, carrier: CarrierArg, path: &Path) -> anyhow::Result<()
     Ok(())
 }
 
-/// SCENE-lit.glb in this folder.
-fn default_output(scene: &str) -> PathBuf {
+/// SCENE-lit.glb in this folder, or SCENE-probes.json.
+fn default_output(scene: &str, carrier: CarrierArg) -> PathBuf {
     let stem = Path::new(scene).file_stem().map_or_else(|| scene.to_owned(), |s| s.to_string_lossy().into_owned());
-    PathBuf::from(format!("{stem}-lit.glb"))
+    PathBuf::from(match carrier {
+        CarrierArg::Probes => format!("{stem}-probes.json"),
+        _ => format!("{stem}-lit.glb"),
+    })
 }
 
 /// How the scene is loaded where a density says how fine cells are to be and nothing else does: as fine as texels.
@@ -180,6 +199,7 @@ fn area(scene: &Scene) -> f64 {
 }
 
 /// What goes into the document.
+#[derive(Default)]
 struct Baked {
     surfaces: Vec<LitSurface>,
     pages: Vec<LitPage>,
@@ -218,6 +238,7 @@ fn bake(
             let light = bake::bake_vertices(scene, &loaded.patches, solution, quality, seed)?;
             of_vertices(&light)
         }
+        // Probes have no document.
         CarrierArg::Lightmap | CarrierArg::Probes => {
             let density = args.density.map_or(TexelDensity::OnePage, TexelDensity::PerMetre);
             let page_size = args.page_size.unwrap_or(PAGE[usize::from(args.density.is_none())]);
