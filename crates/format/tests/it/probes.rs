@@ -63,10 +63,10 @@ impl Texture {
         let base: [f64; 3] =
             std::array::from_fn(|a| ((point[a] + 0.5) * resolution[a]).clamp(0.5, resolution[a] - 0.5) / size[a]);
         let mut sum = [0.0; 3];
-        for axis in 0..3 {
-            let below = if normal[axis] < 0.0 { 0.5 } else { 0.0 };
+        for (axis, component) in normal.into_iter().enumerate() {
+            let below = if component < 0.0 { 0.5 } else { 0.0 };
             let light = self.sample([base[0], base[1] + below, base[2] + axis as f64 / 3.0]);
-            (0..3).for_each(|c| sum[c] += light[c] * normal[axis] * normal[axis]);
+            (0..3).for_each(|c| sum[c] += light[c] * component * component);
         }
         sum
     }
