@@ -41,8 +41,8 @@ impl Texture {
         let mut sum = [0.0; 3];
         for corner in 0..8 {
             let (mut index, mut weight, mut stride) = (0, 1.0, 1);
-            for axis in 0..3 {
-                let texel = place[axis] * self.size[axis] as f64 - 0.5;
+            for (axis, coordinate) in place.into_iter().enumerate() {
+                let texel = coordinate * self.size[axis] as f64 - 0.5;
                 let high = corner >> axis & 1 == 1;
                 let share = texel - texel.floor();
                 weight *= if high { share } else { 1.0 - share };
@@ -61,12 +61,12 @@ impl Texture {
         let size = self.size.map(|n| n as f64);
         let resolution = [size[0], size[1] / 2.0, size[2] / 3.0];
         let base: [f64; 3] =
-            std::array::from_fn(|a| ((point[a] + 0.5) * resolution[a]).max(0.5).min(resolution[a] - 0.5) / size[a]);
+            std::array::from_fn(|a| ((point[a] + 0.5) * resolution[a]).clamp(0.5, resolution[a] - 0.5) / size[a]);
         let mut sum = [0.0; 3];
-        for axis in 0..3 {
-            let below = if normal[axis] < 0.0 { 0.5 } else { 0.0 };
+        for (axis, component) in normal.into_iter().enumerate() {
+            let below = if component < 0.0 { 0.5 } else { 0.0 };
             let light = self.sample([base[0], base[1] + below, base[2] + axis as f64 / 3.0]);
-            (0..3).for_each(|c| sum[c] += light[c] * normal[axis] * normal[axis]);
+            (0..3).for_each(|c| sum[c] += light[c] * component * component);
         }
         sum
     }
@@ -198,6 +198,6 @@ fn exr_has_a_row_of_boxes_in_each_row() {
         assert!((channel("G")[i] / arrays.radiance[i][0][1] - 0.282_094_8).abs() < 1e-6);
     }
     let own = &image.layer_data.attributes.other;
-    let low = own.iter().chain(&image.attributes.other).find(|(name, _)| name.to_string() == "probes.low");
-    assert!(matches!(low, Some((_, AttributeValue::Text(text))) if text.to_string() == "-1 0.5 2"), "{low:?}");
+    let low = own.iter().chain(&image.attributes.other).find(|(name, _)| **name == *"probes.low");
+    assert!(matches!(low, Some((_, AttributeValue::Text(text))) if *text == *"-1 0.5 2"), "{low:?}");
 }
