@@ -100,7 +100,7 @@ fn units() {
     small.instances.iter_mut().for_each(|i| i.transform = DAffine3::from_scale(DVec3::splat(1e-3)) * i.transform);
     assert_eq!(finds(&small, Kind::Units).worst.unit, "m");
     let mut bright = room();
-    bright.materials.iter_mut().for_each(|m| m.emission = m.emission * 1e8);
+    bright.materials.iter_mut().for_each(|m| m.emission *= 1e8);
     assert_eq!(finds(&bright, Kind::Units).worst.unit, "lx");
     let mut sun = room();
     sun.lights.push(PunctualLight {
