@@ -4,7 +4,7 @@ use twinray::format;
 use twinray::render;
 use twinray::scene::SurfaceHit;
 use twinray::scene::check::{Finding, Kind, texels_per_metre};
-use twinray::scene::sources;
+use twinray::scene::{TriangleSource, sources};
 
 use crate::args::{CheckArgs, ShowArg};
 use crate::commands::render::default_size;
@@ -22,8 +22,8 @@ const COLOURS: [(&str, [f64; 3]); 7] = [
     ("blue", [0.0, 0.45, 0.7]),
 ];
 
-/// Texels for a metre at both ends of the false colours.
-const DENSITIES: [f64; 2] = [1.0, 1000.0];
+/// How far the false colours reach to both sides of what half of the surface has.
+const REACH: f64 = 8.0;
 /// Texels along one field of the chequered pattern.
 const FIELD: f64 = 8.0;
 
@@ -38,8 +38,9 @@ pub fn draw(
     let size = [width, height];
     let patches = &authored.patches;
     let (bytes, legend) = if args.show == Some(ShowArg::Density) {
-        let colour = density(authored, args.texture_size);
-        (render::marked(patches, &authored.view, size, colour), density_legend())
+        let middle = middle_density(authored, args.texture_size);
+        let colour = density(authored, args.texture_size, middle);
+        (render::marked(patches, &authored.view, size, colour), density_legend(middle))
     } else {
         let mut shown: Vec<Kind> =
             findings.iter().filter(|f| !f.triangles.is_empty() && shows(args.show, f.kind)).map(|f| f.kind).collect();
@@ -79,15 +80,14 @@ fn shows(show: Option<ShowArg>, kind: Kind) -> bool {
 }
 
 /// The colour of a place by its texels for a metre; grey without second texture coordinates.
-fn density(authored: &Authored, texture_size: u32) -> impl Fn(&SurfaceHit) -> Option<[f64; 3]> + Sync {
+fn density(authored: &Authored, texture_size: u32, middle: f64) -> impl Fn(&SurfaceHit) -> Option<[f64; 3]> + Sync {
     let (scene, patches, sources) = (&authored.scene, &authored.patches, sources(&authored.scene));
     move |hit| {
         let source = sources[hit.triangle as usize];
         let mesh = &scene.meshes[scene.instances[source.instance as usize].mesh];
         let triangle = source.triangle as usize;
         let density = texels_per_metre(mesh, triangle, patches.triangle_area(hit.triangle), texture_size)?;
-        let [low, high] = DENSITIES.map(f64::ln);
-        let level = ((density.ln() - low) / (high - low)).clamp(0.0, 1.0);
+        let level = (0.5 + 0.5 * (density / middle).ln() / REACH.ln()).clamp(0.0, 1.0);
         // The hit's weights are of the corners as they are placed: under a mirror the last two are exchanged.
         let order = if source.mirrored { [0, 2, 1] } else { [0, 1, 2] };
         let uvs = mesh.second_texcoords.as_ref()?;
@@ -105,13 +105,34 @@ fn ramp(level: f64) -> [f64; 3] {
     [near(1.0), near(0.5), near(0.0)]
 }
 
-fn density_legend() -> Vec<(String, String)> {
-    let middle = (DENSITIES[0] * DENSITIES[1]).sqrt().round();
-    let of = |what: String, colour: &str| (format!("{what} texels for a metre"), colour.to_owned());
+fn density_legend(middle: f64) -> Vec<(String, String)> {
+    let of =
+        |density: f64, more: &str, colour: &str| (format!("{density:.1}{more} texels for a metre"), colour.to_owned());
     vec![
-        of(format!("{} or fewer", DENSITIES[0]), "blue"),
-        of(format!("{middle}"), "green"),
-        of(format!("{} or more", DENSITIES[1]), "red"),
+        of(middle / REACH, " or fewer", "blue"),
+        of(middle, "", "green"),
+        of(middle * REACH, " or more", "red"),
         ("no second texture coordinates".to_owned(), "grey".to_owned()),
     ]
+}
+
+/// Texels for a metre that half of the surface has less than; 1 where nothing has any.
+fn middle_density(authored: &Authored, texture_size: u32) -> f64 {
+    let (scene, patches) = (&authored.scene, &authored.patches);
+    let of = |(t, source): (u32, &TriangleSource)| {
+        let mesh = &scene.meshes[scene.instances[source.instance as usize].mesh];
+        let area = patches.triangle_area(t);
+        let density = texels_per_metre(mesh, source.triangle as usize, area, texture_size)?;
+        (density > 0.0).then_some((density, area))
+    };
+    let sources = sources(scene);
+    let mut densities: Vec<(f64, f64)> = (0..).zip(&sources).filter_map(of).collect();
+    densities.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * densities.iter().map(|d| d.1).sum::<f64>();
+    let mut sum = 0.0;
+    let middle = densities.iter().find(|d| {
+        sum += d.1;
+        sum >= half
+    });
+    middle.map_or(1.0, |d| d.0)
 }

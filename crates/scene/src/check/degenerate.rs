@@ -16,8 +16,7 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
             let [a, b, c] = mesh_corners(mesh, t);
             let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
             let across = area_vector_2(a, b, c).length();
-            // Written so that what is no number counts.
-            across <= FLAT * longest || across.is_nan()
+            across.is_nan() || across <= FLAT * longest
         };
         let count = (0..mesh.triangles.len()).filter(|&t| is_flat(t)).count();
         let share = count as f64 / mesh.triangles.len().max(1) as f64;
