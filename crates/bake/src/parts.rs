@@ -20,7 +20,7 @@ pub struct Face {
     pub triangle: u32,
     /// Vertices of the mesh, counter-clockwise in the world as seen from the part's side.
     pub corners: [u32; 3],
-    /// No light reaches it.
+    /// No light reaches it: the unlit side of a sheet that is lit on both elsewhere.
     pub dark: bool,
 }
 
@@ -82,7 +82,8 @@ pub fn parts(scene: &Scene, patches: &PatchScene, solution: &Solution) -> Vec<Pa
             let face = |(&triangle, [power, area]): (&u32, &[f64; 2])| Face {
                 triangle,
                 corners: corners(mesh.triangles[sources[triangle as usize].triangle as usize], source, side),
-                dark: *power <= DARK * mean * area,
+                // Elsewhere a triangle that no ray has met yet has neighbours that know better.
+                dark: two && *power <= DARK * mean * area,
             };
             Part {
                 instance,
