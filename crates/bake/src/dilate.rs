@@ -3,7 +3,8 @@
 use crate::page::Page;
 
 /// Gives texels without light that of their neighbours, in rings around what is known: `rings` of them everywhere, and as
-/// many as it takes where `inner` says that a chart lies there whose light is not known (under what stands on it).
+/// many as it takes where `inner` says that a chart lies there whose light is not known (under what stands on it), from that chart
+/// alone: a chart of which nothing is known stays dark.
 pub fn dilate(page: &mut Page, inner: &[bool], rings: u32) {
     let (width, height) = (page.width as usize, page.height as usize);
     let mut known: Vec<bool> = page.coverage.iter().map(|&c| c > 0.0).collect();
@@ -22,7 +23,7 @@ pub fn dilate(page: &mut Page, inner: &[bool], rings: u32) {
                         continue;
                     }
                     let n = ny as usize * width + nx as usize;
-                    if known[n] {
+                    if known[n] && (ring < rings || inner[n]) {
                         let weight = if dx != 0 && dy != 0 { 0.5 } else { 1.0 };
                         (0..3).for_each(|c| sum[c] += weight * f64::from(page.irradiance[n][c]));
                         total += weight;
@@ -61,6 +62,8 @@ mod tests {
                 }
             }
         }
+        // Another chart, of which nothing is known.
+        (0..3).for_each(|x| inner[15 * 16 + x] = true);
         dilate(&mut page, &inner, 1);
         for y in 0..16 {
             for x in 0..16 {

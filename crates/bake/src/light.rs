@@ -1,5 +1,7 @@
 //! The light at a point of a surface, as texels and vertices ask for it.
 
+use std::ops::Range;
+
 use twinray_render::{IrradianceGather, Reconstruction};
 use twinray_scene::{PatchScene, Rgb, Side, SurfaceHit};
 use twinray_solve::Solution;
@@ -47,8 +49,8 @@ impl<'a> SurfaceLight<'a> {
     }
 
     /// Irradiance, W·m⁻² (or lux), on one side of a triangle at barycentric (`u`, `v`): `None` where the side absorbs, or
-    /// something stands on the point, so that nothing can light it. `key` names the point and `rays` is its share of gather rays.
-    pub fn at(&self, triangle: u32, side: Side, [u, v]: [f64; 2], key: u64, rays: u32) -> Option<Rgb> {
+    /// something stands on the point, so that nothing can light it. Of gather rays it has those of the given numbers of the sequence `key`.
+    pub fn at(&self, triangle: u32, side: Side, [u, v]: [f64; 2], key: u64, rays: Range<u32>) -> Option<Rgb> {
         let patch = self.patches.patch_at(triangle, side, u, v)?;
         let hit = SurfaceHit { triangle, side, u, v, t: 0.0 };
         if self.is_covered(&hit) {
@@ -63,16 +65,28 @@ impl<'a> SurfaceLight<'a> {
 
     /// The same at a point of a page, with its share of a texel's rays.
     pub(crate) fn at_point(&self, point: &PagePoint) -> Option<Rgb> {
-        let rays = (f64::from(self.rays()) * point.share).ceil() as u32;
+        let number = |share: f64| (f64::from(self.rays()) * share) as u32;
+        let first = number(point.before);
+        let rays = first..number(point.before + point.share).max(first + 1);
         self.at(point.triangle, point.side, point.place, point.key, rays)
     }
 
-    /// True if what is met along the normal is the absorbing back of something that the point lies within.
+    /// True if the point lies within something: along the normal one meets what touches it or an absorbing back, or half of
+    /// four other ways end at such backs. Along the normal alone, the front of what stands against the far end of a body would hide its back.
     fn is_covered(&self, hit: &SurfaceHit) -> bool {
         let Some(patch) = self.patches.patch_at(hit.triangle, hit.side, hit.u, hit.v) else { return true };
         let point = self.patches.point_of(hit.triangle, hit.u, hit.v);
-        let met = self.patches.trace_from(patch, point, self.patches.normal(patch));
+        let normal = self.patches.normal(patch);
         let touching = 0.02 * self.patches.cell_area(patch).sqrt();
-        met.is_some_and(|m| m.t < touching || (m.side == Side::Back && self.patches.patch_of(&m).is_none()))
+        let is_back = |m: &SurfaceHit| m.side == Side::Back && self.patches.patch_of(m).is_none();
+        let met = self.patches.trace_from(patch, point, normal);
+        if met.is_some_and(|m| m.t < touching || is_back(&m)) {
+            return true;
+        }
+        let (s, t) = normal.any_orthonormal_pair();
+        let ends_within = |tilt: glam::DVec3| {
+            self.patches.trace_from(patch, point, (normal + tilt).normalize()).is_some_and(|m| is_back(&m))
+        };
+        [s, -s, t, -t].into_iter().filter(|&tilt| ends_within(tilt)).count() >= 2
     }
 }

@@ -31,8 +31,10 @@ pub struct PagePoint {
     pub page: u32,
     /// On the page, in [0, 1]².
     pub uv: [f64; 2],
-    /// Names the point among all.
+    /// Names the texel among all.
     pub key: u64,
+    /// Share of the texel that came before it.
+    pub before: f64,
     /// What it stands for, as a share of a texel.
     pub share: f64,
 }
@@ -93,6 +95,9 @@ pub fn fill(
             }
         }
     }
+    for (page, charted) in pages.iter_mut().zip(&charted) {
+        drop_slivers(page, charted);
+    }
     if let Some((page, [low, high])) = atlas.dark {
         let page = &mut pages[page as usize];
         let span = |axis: usize, size: u32| {
@@ -106,6 +111,23 @@ pub fn fill(
         }
     }
     Ok((pages, charted))
+}
+
+/// Forgets what is known of texels that a chart hardly touches, where it has others beside them: a line on the rim of a floor
+/// may see past the wall that stands on it.
+fn drop_slivers(page: &mut Page, charted: &[bool]) {
+    let (width, height) = (page.width as usize, page.height as usize);
+    let is_sliver = |i: usize| page.coverage[i] > 0.0 && page.coverage[i] < SLIVER;
+    let has_more = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        rows.flat_map(|y| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x))
+            .any(|n| n != i && charted[n] && !is_sliver(n))
+    };
+    let dropped: Vec<usize> = (0..charted.len()).filter(|&i| is_sliver(i) && has_more(i)).collect();
+    for i in dropped {
+        (page.irradiance[i], page.coverage[i]) = ([0.0; 3], 0.0);
+    }
 }
 
 fn tasks(atlas: &Atlas, parts: &[Part]) -> Vec<Task> {
@@ -147,7 +169,8 @@ fn pieces(
     }
     let (triangle, side) = (part.faces[task.face as usize].triangle, part.side);
     texels_of(corners, [task.columns.clone(), task.rows.clone()], |x, y, piece| {
-        let (mut sum, mut known) = (Rgb::BLACK, 0.0);
+        let (mut sum, mut known, mut before) = (Rgb::BLACK, 0.0, 0.0);
+        let texel = y * size[0] + x;
         for k in 1..piece.len() - 1 {
             let fan = [piece[0], piece[k], piece[k + 1]];
             let area = (0.5 * cross(fan[0], fan[1], fan[2])).abs();
@@ -159,10 +182,10 @@ fn pieces(
                     cross(corners[0], corners[1], point) / whole,
                 ];
                 let share = area / points.len() as f64;
-                // The place on the page names the point, whatever else there is.
-                let key = u64::from(page) ^ point[0].to_bits().rotate_left(19) ^ point[1].to_bits();
+                let key = (u64::from(page) << 32) | u64::from(texel);
                 let uv = [point[0] / f64::from(size[0]), point[1] / f64::from(size[1])];
-                let point = PagePoint { triangle, side, place: part.place(weights), page, uv, key, share };
+                let point = PagePoint { triangle, side, place: part.place(weights), page, uv, key, before, share };
+                before += share;
                 if let Some(there) = value(&point) {
                     sum += there * share;
                     known += share;
@@ -170,7 +193,7 @@ fn pieces(
             }
         }
         let value = (known > 0.0).then(|| sum / known);
-        found.push(Piece { page, texel: y * size[0] + x, area: known, value });
+        found.push(Piece { page, texel, area: known, value });
     });
     found
 }
@@ -187,6 +210,9 @@ fn points([a, b, c]: [[f64; 2]; 3], area: f64) -> Points {
     let other = 0.5 * third;
     Points([middle, at(corner, other, other), at(other, corner, other), at(other, other, corner)], 4)
 }
+
+/// Texels below which a piece tells too little of its texel.
+const SLIVER: f32 = 1e-3;
 
 /// Texels below which one point is enough.
 const SMALL: f64 = 0.1;

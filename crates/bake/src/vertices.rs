@@ -123,8 +123,8 @@ fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLigh
             (s, t) = (1.0 - s, 1.0 - t);
         }
         let weights = [1.0 - s - t, s, t];
-        let rays = light.rays().div_ceil(count);
-        let key = (u64::from(triangle) << 20) ^ u64::from(k);
+        let each = light.rays().div_ceil(count);
+        let (key, rays) = (u64::from(triangle), k * each..(k + 1) * each);
         let Some(there) = light.at(triangle, part.side, part.place(weights), key, rays) else { continue };
         for c in 0..3 {
             right[c] += there * weights[c];

@@ -493,7 +493,7 @@ pub struct BakeArgs {
     #[arg(long, value_enum)]
     pub quality: Option<QualityArg>,
     /// Of --quality high: rays that each texel gathers with
-    #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[arg(long, value_name = "N", default_value = "256", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub texel_rays: u32,
     /// Of --to probes: how far they are apart, at most [default: a metre, less in small scenes]
     #[arg(long, value_name = "METRES", value_parser = above_zero, allow_negative_numbers = true)]

@@ -1,5 +1,7 @@
 //! Irradiance at any point by rays that gather what a solution knows: bakes at the resolution of their texels.
 
+use std::ops::Range;
+
 use twinray_scene::brdf::{Brdf, Scatter};
 use twinray_scene::sample::PixelSample;
 use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
@@ -21,9 +23,9 @@ impl<'a> IrradianceGather<'a> {
         Self { estimator: Estimator::new(scene, solution), scene }
     }
 
-    /// Irradiance, W·m⁻² (or lux), at a hit on `patch`: the mean of `rays` rays, each with a shadow ray. `seed` and `key`,
-    /// which names the point, choose them.
-    pub fn at(&self, patch: PatchId, hit: &SurfaceHit, rays: u32, seed: u64, key: u64) -> Rgb {
+    /// Irradiance, W·m⁻² (or lux), at a hit on `patch`: the mean of some rays, each with a shadow ray. `seed` and `key` choose
+    /// a sequence, of which these are the rays of the given numbers: points that are averaged share one, and are even together.
+    pub fn at(&self, patch: PatchId, hit: &SurfaceHit, rays: Range<u32>, seed: u64, key: u64) -> Rgb {
         let scene = self.scene;
         let geometric = scene.normal(patch);
         let normal = scene.shading_normal(hit.triangle, hit.side, hit.u, hit.v);
@@ -42,7 +44,8 @@ impl<'a> IrradianceGather<'a> {
         let point = Point { vertex, aim: Aim { brdf, guide: None }, throughput: Rgb::WHITE, expected: Rgb::BLACK };
         let shadows = self.estimator.shadows();
         let mut sum = Rgb::BLACK;
-        for index in 0..rays.max(1) {
+        let count = rays.len().max(1) as f64;
+        for index in rays {
             let mut numbers = PixelSample::new(seed, key, index);
             sum += self.estimator.lit(&point, shadows, &mut numbers).0;
             numbers.jump(0);
@@ -53,6 +56,6 @@ impl<'a> IrradianceGather<'a> {
                     brdf.eval(g.direction) * (normal.dot(g.direction) / g.density) * (g.emitted + scattered + g.other);
             }
         }
-        sum * (std::f64::consts::PI / f64::from(rays.max(1)))
+        sum * (std::f64::consts::PI / count)
     }
 }
