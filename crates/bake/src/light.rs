@@ -71,22 +71,12 @@ impl<'a> SurfaceLight<'a> {
         self.at(point.triangle, point.side, point.place, point.key, rays)
     }
 
-    /// True if the point lies within something: along the normal one meets what touches it or an absorbing back, or half of
-    /// four other ways end at such backs. Along the normal alone, the front of what stands against the far end of a body would hide its back.
+    /// True if what is met along the normal touches the point, or is the absorbing back of something that the point lies within.
     fn is_covered(&self, hit: &SurfaceHit) -> bool {
         let Some(patch) = self.patches.patch_at(hit.triangle, hit.side, hit.u, hit.v) else { return true };
         let point = self.patches.point_of(hit.triangle, hit.u, hit.v);
-        let normal = self.patches.normal(patch);
+        let met = self.patches.trace_from(patch, point, self.patches.normal(patch));
         let touching = 0.02 * self.patches.cell_area(patch).sqrt();
-        let is_back = |m: &SurfaceHit| m.side == Side::Back && self.patches.patch_of(m).is_none();
-        let met = self.patches.trace_from(patch, point, normal);
-        if met.is_some_and(|m| m.t < touching || is_back(&m)) {
-            return true;
-        }
-        let (s, t) = normal.any_orthonormal_pair();
-        let ends_within = |tilt: glam::DVec3| {
-            self.patches.trace_from(patch, point, (normal + tilt).normalize()).is_some_and(|m| is_back(&m))
-        };
-        [s, -s, t, -t].into_iter().filter(|&tilt| ends_within(tilt)).count() >= 2
+        met.is_some_and(|m| m.t < touching || (m.side == Side::Back && self.patches.patch_of(&m).is_none()))
     }
 }
