@@ -85,20 +85,22 @@ fn examples() -> Result<(), String> {
     for path in structure::files(&structure::root().join("crates/twinray/examples"), "rs")? {
         names.extend(path.file_stem().map(|s| s.to_string_lossy().into_owned()));
     }
+    let built = programs()?;
     let folder = Folder::new()?;
     for name in names {
-        let mut command = cargo();
-        let manifest = structure::root().join("Cargo.toml");
-        command.args(["run", "--quiet", "--release", "--package", "twinray", "--example", &name, "--manifest-path"]);
-        command.arg(manifest).current_dir(&folder.0);
-        // A relative target folder is meant from the root.
-        if let Some(target) = std::env::var_os("CARGO_TARGET_DIR") {
-            command.env("CARGO_TARGET_DIR", structure::root().join(target));
-        }
         eprintln!("xtask examples: {name}");
-        run(&mut command)?;
+        run(Command::new(built.join("examples").join(&name)).current_dir(&folder.0))?;
     }
     Ok(())
+}
+
+/// The folder of the programs that `cargo test` builds, optimised and with all their checks: the command and the examples
+/// are not compiled a second time.
+fn programs() -> Result<PathBuf, String> {
+    run(cargo().args(["test", "--quiet", "--workspace", "--no-run"]))?;
+    // A relative target folder is meant from the root.
+    let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    Ok(structure::root().join(target).join("debug"))
 }
 
 fn validate() -> Result<(), String> {
@@ -124,11 +126,16 @@ fn mpi() -> Result<(), String> {
 }
 
 fn web() -> Result<(), String> {
-    run(Command::new("bash").arg("crates/view/web/check.sh").current_dir(structure::root()))
+    in_browser("crates/view/web/check.sh")
 }
 
 fn three() -> Result<(), String> {
-    run(Command::new("bash").arg("engines/three/check.sh").current_dir(structure::root()))
+    in_browser("engines/three/check.sh")
+}
+
+fn in_browser(script: &str) -> Result<(), String> {
+    let command = programs()?.join(format!("twinray{}", std::env::consts::EXE_SUFFIX));
+    run(Command::new("bash").arg(script).env("TWINRAY", command).current_dir(structure::root()))
 }
 
 fn deps() -> Result<(), String> {
