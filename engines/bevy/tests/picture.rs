@@ -12,16 +12,34 @@ const SQUARE: u32 = 8;
 #[test]
 #[ignore = "needs twinray and a Vulkan driver: check.sh"]
 fn cornell_looks_as_twinray_shows_it() {
+    looks_right("cornell", "--density 100", 0.02);
+}
+
+#[test]
+#[ignore = "needs twinray and a Vulkan driver: check.sh"]
+fn doorway_looks_as_twinray_shows_it() {
+    looks_right("doorway", "--density 20", 0.04);
+}
+
+#[test]
+#[ignore = "needs twinray and a Vulkan driver: check.sh"]
+fn hall_looks_as_twinray_shows_it() {
+    looks_right("hall-diffuse", "", 0.05);
+}
+
+/// Bakes a scene and compares pictures: means within 2 %, half of the squares within `most`.
+fn looks_right(name: &str, how: &str, most: f64) {
     let folder = tempfile::tempdir().unwrap();
-    twinray(folder.path(), "solve cornell --rays 20M -o cornell.twin -q");
-    twinray(folder.path(), "bake cornell.twin --for bevy --density 100 -o lit.glb -q");
-    twinray(folder.path(), "render cornell.twin -o twinray.exr --size 480x360 --method gather --samples 16 -q");
-    let log = shot(folder.path(), "lit.glb --shot bevy.exr --size 480x360");
+    twinray(folder.path(), &format!("solve {name} --rays 20M -o {name}.twin -q"));
+    twinray(folder.path(), &format!("bake {name}.twin --for bevy -o lit.glb -q {how}"));
+    let size = "--size 480x360";
+    twinray(folder.path(), &format!("render {name}.twin -o twinray.exr {size} --method gather --samples 16 -q"));
+    let log = shot(folder.path(), &format!("lit.glb --shot bevy.exr {size}"));
     let [ours, theirs] = ["bevy.exr", "twinray.exr"].map(|name| read(&folder.path().join(name)));
     let (ratio, median) = compare(&ours, &theirs);
-    println!("cornell: ratio of means {ratio:.4}, half of the squares within {:.2} %", 100.0 * median);
+    println!("{name}: ratio of means {ratio:.4}, half of the squares within {:.2} %", 100.0 * median);
     assert!((ratio - 1.0).abs() < 0.02, "ratio of means {ratio}\n{log}");
-    assert!(median < 0.02, "half of the squares within {median}\n{log}");
+    assert!(median < most, "half of the squares within {median}\n{log}");
 }
 
 /// A copy with a lamp of its own under the ceiling, baked with and without it in the file: what is baked is not added again.
