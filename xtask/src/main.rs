@@ -1,5 +1,6 @@
 //! Chores: `cargo xtask ci` and its parts; `cargo xtask validate`; `cargo xtask bench`;
-//! `cargo xtask sanitize`, `cargo xtask mpi`. No tool has to be installed beside Rust itself, but for these two and `web`.
+//! `cargo xtask sanitize`, `cargo xtask bevy`. No tool has to be installed beside Rust itself, but for these two, `mpi`, `web`
+//! and `three`.
 //!
 //! One line a step; the first step that fails ends the run and is named. `structure` holds the checks that need no
 //! compiler, which are tests of this crate as well.
@@ -44,10 +45,14 @@ const BENCH: Step = ("bench", "measures, writes docs/performance.md: [--quick] [
 const SANITIZE: Step =
     ("sanitize", "the code with `unsafe` under Miri and AddressSanitizer; needs a nightly", sanitize::run);
 
+/// Nor this: Bevy wants a newer compiler than the rest, and takes longer to compile than all of `ci`.
+const BEVY: Step =
+    ("bevy", "baked light as Bevy shows it on a Vulkan driver in software, installed where missing", bevy);
+
 fn main() -> ExitCode {
     let wish = std::env::args().nth(1).unwrap_or_default();
     let steps: Vec<&Step> = STEPS.iter().filter(|(name, ..)| wish == "ci" || wish == *name).collect();
-    let apart = [&VALIDATE, &BENCH, &SANITIZE];
+    let apart = [&VALIDATE, &BENCH, &SANITIZE, &BEVY];
     let steps = apart.iter().find(|(name, ..)| wish == *name).map_or(steps, |step| vec![*step]);
     if steps.is_empty() {
         eprintln!("usage: cargo xtask COMMAND\n\n  ci         all of these, in this order");
@@ -136,6 +141,11 @@ fn three() -> Result<(), String> {
 fn in_browser(script: &str) -> Result<(), String> {
     let command = programs()?.join(format!("twinray{}", std::env::consts::EXE_SUFFIX));
     run(Command::new("bash").arg(script).env("TWINRAY", command).current_dir(structure::root()))
+}
+
+/// The script takes the compiler that Bevy wants, and does not see the one of this program's cargo.
+fn bevy() -> Result<(), String> {
+    run(Command::new("bash").arg("engines/bevy/check.sh").current_dir(structure::root()))
 }
 
 fn deps() -> Result<(), String> {
