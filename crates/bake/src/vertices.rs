@@ -10,6 +10,7 @@ use twinray_solve::Solution;
 use crate::atlas::{AtlasError, area};
 use crate::light::{Quality, SurfaceLight};
 use crate::parts::{Part, parts};
+use crate::watch::{Stage, Watch};
 
 /// Weight of the smoothness of neighbours beside the light itself.
 const SMOOTH: f64 = 0.02;
@@ -18,6 +19,8 @@ const STEPS: usize = 40;
 const ROUNDS: usize = 8;
 /// Points at which the light of a face is asked for, at least and at most.
 const POINTS: [f64; 2] = [16.0, 1024.0];
+/// Faces between two looks at who may want to stop.
+const BATCH: usize = 4096;
 
 /// Irradiance at the vertices of the meshes.
 #[derive(Clone, Debug)]
@@ -31,26 +34,33 @@ pub struct VertexLight {
 /// Bakes the light of `solution` into vertices.
 ///
 /// # Errors
-/// [`AtlasError::Nothing`] if no surface reflects diffusely.
+/// [`AtlasError::Nothing`] if no surface reflects diffusely; [`AtlasError::Cancelled`] if `watch` stops it.
 pub fn bake_vertices(
     scene: &Scene,
     patches: &PatchScene,
     solution: &Solution,
     quality: Quality,
     seed: u64,
+    watch: &mut Watch<'_>,
 ) -> Result<VertexLight, AtlasError> {
     let parts = parts(scene, patches, solution);
     if parts.is_empty() {
         return Err(AtlasError::Nothing);
     }
     let light = SurfaceLight::new(patches, solution, quality, seed);
-    let irradiance = parts
-        .iter()
-        .map(|part| {
-            let mesh = &scene.meshes[scene.instances[part.instance].mesh];
-            fit(patches, part, mesh.positions.as_slice(), mesh.normals.as_deref(), &light)
-        })
-        .collect();
+    let faces = parts.iter().map(|p| p.faces.len()).sum::<usize>().max(1) as f64;
+    let mut done = 0;
+    let mut irradiance = Vec::with_capacity(parts.len());
+    for part in &parts {
+        let mesh = &scene.meshes[scene.instances[part.instance].mesh];
+        let mut found = Vec::with_capacity(part.faces.len());
+        for batch in part.faces.chunks(BATCH) {
+            found.par_extend(batch.par_iter().map(|face| moments(patches, part, face.triangle, &light)));
+            done += batch.len();
+            watch(Stage::Vertices, done as f64 / faces)?;
+        }
+        irradiance.push(fit(part, &found, &mesh.positions, mesh.normals.as_deref()));
+    }
     Ok(VertexLight { parts, irradiance })
 }
 
@@ -61,13 +71,8 @@ struct Moments {
     right: [Rgb; 3],
 }
 
-fn fit(
-    patches: &PatchScene,
-    part: &Part,
-    positions: &[[f32; 3]],
-    normals: Option<&[[f32; 3]]>,
-    light: &SurfaceLight<'_>,
-) -> Vec<[f32; 3]> {
+/// The values at the vertices of a part whose faces gave `found`.
+fn fit(part: &Part, found: &[Moments], positions: &[[f32; 3]], normals: Option<&[[f32; 3]]>) -> Vec<[f32; 3]> {
     // Vertices that were split for texture coordinates alone are one.
     let mut number = HashMap::new();
     let mut variables = 0;
@@ -80,10 +85,9 @@ fn fit(
             })
         })
         .collect();
-    let found: Vec<Moments> = part.faces.par_iter().map(|face| moments(patches, part, face.triangle, light)).collect();
     let corners: Vec<[usize; 3]> = part.faces.iter().map(|f| f.corners.map(|k| variable[k as usize])).collect();
     let (mut right, mut mass) = (vec![Rgb::BLACK; variables], vec![0.0; variables]);
-    for (corner, moments) in corners.iter().zip(&found) {
+    for (corner, moments) in corners.iter().zip(found) {
         for k in 0..3 {
             right[corner[k]] += moments.right[k];
             mass[corner[k]] += moments.area / 3.0;

@@ -9,6 +9,10 @@ pub enum Stage {
     Texels,
     /// Charts are made to agree.
     Seams,
+    /// Light is fitted to vertices.
+    Vertices,
+    /// Probes look around.
+    Probes,
 }
 
 /// Somebody stopped it.

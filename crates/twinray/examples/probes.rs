@@ -16,7 +16,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let patches = PatchScene::new(&scene, PatchOptions { budget, ..PatchOptions::default() })?;
         let mut solver = Solver::new(&patches, Params::default_preset(1), None)?;
         solver.run(100 * patches.len() as u64);
-        let volume = bake_probes(&patches, &solver.solution(), &ProbeOptions { rays: 128, ..ProbeOptions::default() })?;
+        let volume = bake_probes(
+            &patches,
+            &solver.solution(),
+            &ProbeOptions { rays: 128, ..ProbeOptions::default() },
+            &mut |_, _| Ok(()),
+        )?;
 
         let valid = volume.validity.iter().filter(|v| **v > 0.0).count();
         println!(

@@ -3,6 +3,8 @@
 use glam::DVec3;
 use twinray_scene::PatchScene;
 
+use crate::watch::Cancelled;
+
 /// Number of a probe's neighbours.
 pub const NEIGHBOURS: usize = 26;
 
@@ -31,6 +33,9 @@ pub enum ProbeError {
     /// Not a length.
     #[error("probes {0} m apart make no sense: expected a positive number")]
     Spacing(f64),
+    /// Somebody stopped it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// None along an axis.
     #[error("a grid needs at least one probe along each axis")]
     Empty,

@@ -16,9 +16,14 @@ use twinray_render::RadianceGather;
 use twinray_scene::{PatchScene, Rgb};
 use twinray_solve::Solution;
 
+use crate::watch::{Stage, Watch};
+
 pub use grid::{NEIGHBOURS, ProbeError, ProbeGrid, ProbeSpacing, neighbours};
 pub use harmonics::{HARMONICS, Harmonics};
 use place::Place;
+
+/// Probes between two looks at who may want to stop.
+const BATCH: usize = 256;
 
 /// Settings of [`bake_probes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,37 +66,35 @@ pub struct ProbeVolume {
 /// The result depends on these values alone, not on threads.
 ///
 /// # Errors
-/// If the spacing is no length, or asks for too many probes.
+/// If the spacing is no length, or asks for too many probes; [`ProbeError::Cancelled`] if `watch` stops it.
 pub fn bake_probes(
     patches: &PatchScene,
     solution: &Solution,
     options: &ProbeOptions,
+    watch: &mut Watch<'_>,
 ) -> Result<ProbeVolume, ProbeError> {
     let grid = ProbeGrid::new(patches, options.spacing)?;
     let gather = RadianceGather::new(patches, solution);
     let places: Vec<Place> =
         (0..grid.len()).into_par_iter().map(|probe| place::place(patches, solution, &grid, probe)).collect();
-    let light: Vec<[Rgb; HARMONICS]> = (places.par_iter().enumerate())
-        .map(|(probe, place)| {
-            let mut sum = [Rgb::BLACK; HARMONICS];
-            if place.validity > 0.0 {
-                let point = place.point - patches.centre();
-                gather.over_sphere(
-                    point,
-                    options.rays,
-                    options.punctual,
-                    options.seed,
-                    probe as u64,
-                    |towards, light| {
-                        let basis = twinray_render::walk::basis(towards);
-                        sum.iter_mut().zip(basis).for_each(|(s, b)| *s += light * b);
-                    },
-                );
-            }
-            sum
-        })
-        .collect();
-    let mut radiance: Vec<Harmonics> = light.into_iter().map(Harmonics::from_rgb).collect();
+    let light = |probe: usize| {
+        let mut sum = [Rgb::BLACK; HARMONICS];
+        if places[probe].validity > 0.0 {
+            let ProbeOptions { rays, punctual, seed, .. } = *options;
+            let point = places[probe].point - patches.centre();
+            gather.over_sphere(point, rays, punctual, seed, probe as u64, |towards, light| {
+                let basis = twinray_render::walk::basis(towards);
+                sum.iter_mut().zip(basis).for_each(|(s, b)| *s += light * b);
+            });
+        }
+        Harmonics::from_rgb(sum)
+    };
+    let mut radiance: Vec<Harmonics> = Vec::with_capacity(places.len());
+    while radiance.len() < places.len() {
+        let batch = radiance.len()..(radiance.len() + BATCH).min(places.len());
+        radiance.par_extend(batch.into_par_iter().map(light));
+        watch(Stage::Probes, radiance.len() as f64 / places.len() as f64)?;
+    }
     fill::fill(patches, &grid, &places, &mut radiance);
     let nearness = places.par_iter().map(|place| reach::nearness(patches, &grid, place.point)).collect();
     let offset = places.iter().enumerate().map(|(i, p)| (p.point - grid.point(i)).as_vec3().to_array()).collect();

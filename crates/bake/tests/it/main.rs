@@ -4,3 +4,4 @@ mod lightmap;
 mod probes;
 mod scenes;
 mod vertices;
+mod watch;

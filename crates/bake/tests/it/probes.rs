@@ -13,7 +13,8 @@ use twinray_solve::Solution;
 use crate::scenes::{Boxes, cut, solve};
 
 fn baked(patches: &PatchScene, solution: &Solution, spacing: ProbeSpacing, rays: u32) -> ProbeVolume {
-    bake_probes(patches, solution, &ProbeOptions { spacing, rays, ..ProbeOptions::default() }).expect("probes")
+    bake_probes(patches, solution, &ProbeOptions { spacing, rays, ..ProbeOptions::default() }, &mut |_, _| Ok(()))
+        .expect("probes")
 }
 
 /// Even directions.
@@ -109,7 +110,7 @@ fn a_small_lamp_follows_the_cosine_law() {
         // Whoever lights objects with such lights by himself has them once.
         let options =
             ProbeOptions { spacing: ProbeSpacing::Counts([5, 3, 2]), punctual: false, ..ProbeOptions::default() };
-        let without = bake_probes(&patches, &solution, &options).expect("probes").radiance[probe];
+        let without = bake_probes(&patches, &solution, &options, &mut |_, _| Ok(())).expect("probes").radiance[probe];
         assert_eq!(without.0[0][0] > 0.0, with_area);
     }
 }
@@ -181,7 +182,7 @@ fn probes_agree_with_paths() {
     let many: Vec<ProbeVolume> = (0..8)
         .map(|seed| {
             let options = ProbeOptions { spacing, rays: 256, seed, ..ProbeOptions::default() };
-            bake_probes(&patches, &solution, &options).expect("probes")
+            bake_probes(&patches, &solution, &options, &mut |_, _| Ok(())).expect("probes")
         })
         .collect();
     for probe in [4, 15, 22] {
@@ -239,7 +240,9 @@ fn threads_do_not_change_a_bit() {
 fn senseless_grids_are_refused() {
     let patches = cut(&builtin::cornell(false), 0.5);
     let solution = solve(&patches, 1000);
-    let error = |spacing| bake_probes(&patches, &solution, &ProbeOptions { spacing, ..ProbeOptions::default() }).err();
+    let error = |spacing| {
+        bake_probes(&patches, &solution, &ProbeOptions { spacing, ..ProbeOptions::default() }, &mut |_, _| Ok(())).err()
+    };
     for spacing in [0.0, -1.0, f64::INFINITY] {
         assert_eq!(error(ProbeSpacing::Metres(spacing)), Some(ProbeError::Spacing(spacing)));
     }

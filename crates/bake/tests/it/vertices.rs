@@ -16,7 +16,7 @@ fn vertices_have_the_power_of_the_solution() {
     let scene = room.0;
     let patches = cut(&scene, 0.1);
     let solution = solve(&patches, 2_000_000);
-    let baked = bake_vertices(&scene, &patches, &solution, Quality::Smooth, 1).expect("light");
+    let baked = bake_vertices(&scene, &patches, &solution, Quality::Smooth, 1, &mut |_, _| Ok(())).expect("light");
     let (mut found, mut truth, mut area_of_parts) = (0.0, 0.0, 0.0);
     for (part, values) in baked.parts.iter().zip(&baked.irradiance) {
         for face in &part.faces {

@@ -11,7 +11,7 @@ use anyhow::{anyhow, bail};
 use serde_json::{Value, json};
 use twinray::bake::{
     self, AtlasError, AtlasOptions, Cancelled, Layout, Lightmap, LightmapOptions, Part, Quality, Stage, TexelDensity,
-    VertexLight,
+    VertexLight, Watch,
 };
 use twinray::format::{Lit, LitGlb, LitPage, LitSurface, LitVertex};
 use twinray::render::{Exposure, PictureOptions, render};
@@ -73,16 +73,24 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     loaded.warnings.extend(loss);
     let solving_seconds = start.elapsed().as_secs_f64();
 
+    let mut progress = FrameProgress::new(1, args.load.quiet).counting("baking");
+    let mut watch = |stage: Stage, share: f64| {
+        if !matches!(stage, Stage::Atlas | Stage::Seams) {
+            progress.update(share);
+        }
+        // What a signal stopped already is finished with what there is; the next one ends it.
+        if interrupt::requested() && !interrupted { Err(Cancelled) } else { Ok(()) }
+    };
     let mut baked = match carrier {
         CarrierArg::Probes => Baked::default(),
-        _ => bake(args, carrier, &loaded, &scene, &solution, &path, interrupted).map_err(|e| match e {
-            AtlasError::Cancelled(_) => anyhow!("{name}: stopped before anything could be written"),
+        _ => bake(args, carrier, &loaded, &scene, &solution, &path, &mut watch).map_err(|e| match e {
+            AtlasError::Cancelled(_) => stopped(name),
             other => anyhow!("{name}: {other}"),
         })?,
     };
     let (bytes, about) = match &document {
         None => {
-            let (bytes, facts, line) = probes::bake(args, &loaded, &solution, &path)?;
+            let (bytes, facts, line) = probes::bake(args, &loaded, &solution, &path, &mut watch)?;
             (baked.facts, baked.words) = (facts, vec![line]);
             (bytes, about(&scene, &loaded, &solution, settings, &baked))
         }
@@ -97,6 +105,7 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
             (bytes, about)
         }
     };
+    progress.finish();
     for (path, bytes) in &baked.files {
         Output::open(path)?.write(bytes)?;
     }
@@ -216,7 +225,7 @@ fn bake(
     scene: &Scene,
     solution: &Solution,
     path: &Path,
-    interrupted: bool,
+    watch: &mut Watch<'_>,
 ) -> Result<Baked, AtlasError> {
     let quality = match args.quality.unwrap_or_default() {
         QualityArg::Cells => Quality::Cells,
@@ -224,18 +233,10 @@ fn bake(
         QualityArg::High => Quality::Gathered(args.texel_rays),
     };
     let seed = args.solve.seed.unwrap_or(1);
-    let mut progress = FrameProgress::new(1, args.load.quiet).counting("baking");
-    let mut watch = |stage: Stage, share: f64| {
-        if stage == Stage::Texels {
-            progress.update(share);
-        }
-        // What a signal stopped already is finished with what there is; the next one ends it.
-        if interrupt::requested() && !interrupted { Err(Cancelled) } else { Ok(()) }
-    };
     let engine = args.engine.unwrap_or_default();
-    let baked = match carrier {
+    Ok(match carrier {
         CarrierArg::Vertex => {
-            let light = bake::bake_vertices(scene, &loaded.patches, solution, quality, seed)?;
+            let light = bake::bake_vertices(scene, &loaded.patches, solution, quality, seed, watch)?;
             of_vertices(&light)
         }
         // Probes have no document.
@@ -244,10 +245,10 @@ fn bake(
             let page_size = args.page_size.unwrap_or(PAGE[usize::from(args.density.is_none())]);
             let atlas = AtlasOptions { density, page_size, padding: args.padding, keep_authored: !args.unwrap };
             let options = LightmapOptions { atlas, quality, stitch: !args.no_stitch, seed };
-            let map = bake::bake(scene, &loaded.patches, solution, &options, &mut watch)?;
+            let map = bake::bake(scene, &loaded.patches, solution, &options, watch)?;
             let mut baked = of_lightmap(&map);
             if engine == EngineArg::Unlit {
-                let colours = bake::colours(&loaded.patches, &map, args.padding, &mut watch)?;
+                let colours = bake::colours(&loaded.patches, &map, args.padding, watch)?;
                 baked.pages = flavours::unlit(&colours, exposure(args, loaded, solution));
             } else {
                 let dressed = flavours::lightmaps(&map, engine, path);
@@ -255,9 +256,12 @@ fn bake(
             }
             baked
         }
-    };
-    progress.finish();
-    Ok(baked)
+    })
+}
+
+/// What a second signal, or one after the solve, leaves to be said.
+fn stopped(name: &str) -> anyhow::Error {
+    anyhow!("{name}: stopped before anything could be written")
 }
 
 /// The factor of pictures: what `--exposure` says, or that of a picture from the scene's first camera.

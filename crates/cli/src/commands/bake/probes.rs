@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{anyhow, bail};
 use serde_json::{Value, json};
-use twinray::bake::{ProbeOptions, ProbeSpacing, bake_probes};
+use twinray::bake::{ProbeError, ProbeOptions, ProbeSpacing, Watch, bake_probes};
 use twinray::format::{ProbeArrays, ProbeLattice, write_bevy_volume, write_probes_exr, write_probes_json};
 use twinray::solve::Solution;
 
@@ -25,6 +25,7 @@ pub fn bake(
     loaded: &Loaded,
     solution: &Solution,
     path: &Path,
+    watch: &mut Watch<'_>,
 ) -> anyhow::Result<(Vec<u8>, Value, String)> {
     let name = &args.load.scene;
     let options = ProbeOptions {
@@ -33,7 +34,10 @@ pub fn bake(
         punctual: !args.keep_lights,
         seed: args.solve.seed.unwrap_or(1),
     };
-    let volume = bake_probes(&loaded.patches, solution, &options).map_err(|e| anyhow!("{name}: {e}"))?;
+    let volume = bake_probes(&loaded.patches, solution, &options, watch).map_err(|e| match e {
+        ProbeError::Cancelled(_) => super::stopped(name),
+        other => anyhow!("{name}: {other}"),
+    })?;
     let lattice = ProbeLattice { low: volume.grid.low, cell: volume.grid.cell, counts: volume.grid.counts };
     let radiance: Vec<[[f32; 3]; 9]> = volume.radiance.iter().map(|h| h.0).collect();
     let arrays = ProbeArrays {
