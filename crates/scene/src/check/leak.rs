@@ -21,6 +21,8 @@ const BESIDE: f64 = 0.01;
 const NARROW: f64 = 0.2;
 /// Fewer are noise of the arithmetic.
 const RAYS: usize = 20;
+/// Fewer through slits beside windows are chance: bars, leaves and the frames of windows have none or next to none.
+const SLIT_RAYS: usize = 10;
 /// From one side of a gap beside windows to the other, metres: more is a window seen at a low angle.
 const WIDE: f64 = 0.1;
 /// Of four ways across a ray so many meet both sides of a slit; in the corner of a window one does.
@@ -48,7 +50,7 @@ pub fn find(subject: &Subject, walks: &Walks) -> Vec<Finding> {
     let ways = if is_closed { 1 } else { ACROSS };
     let rims: Vec<Rim> = rims.into_iter().filter(|rims| rims.len() >= ways).map(|rims| rims[0]).collect();
     let rims = if is_closed { rims } else { slits(rims) };
-    if !is_closed && rims.len() < RAYS {
+    if !is_closed && rims.len() < SLIT_RAYS {
         return Vec::new();
     }
     let mut instances = vec![(0usize, DVec3::ZERO); subject.scene.instances.len()];
