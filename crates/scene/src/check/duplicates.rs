@@ -17,6 +17,8 @@ const APART: f64 = 1e-4;
 const SHARE: f64 = 0.01;
 /// Share of an instance's area that is worth a warning.
 const LITTLE: f64 = 1e-3;
+/// Share of the scene's area that is: less is some square centimetres in a hall.
+const SPECK: f64 = 1e-6;
 /// Cosine between planes that are one.
 const PARALLEL: f64 = 1.0 - 1e-6;
 
@@ -47,11 +49,16 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
         triangles[subject.instance_of(t)].push(t);
     }
     let of_instance = |i: usize| -> Vec<u32> { subject.triangles().filter(|&t| subject.instance_of(t) == i).collect() };
+    let speck = SPECK * subject.patches.total_area();
     let finding = |(i, triangles): (usize, Vec<u32>)| {
         let twice: f64 = triangles.iter().map(|&t| doubled[t as usize]).sum();
         (!triangles.is_empty()).then(|| Finding {
             kind: Kind::CoplanarDuplicates,
-            severity: if twice < LITTLE * subject.area(&of_instance(i)) { Severity::Note } else { Severity::Warning },
+            severity: if twice < speck.max(LITTLE * subject.area(&of_instance(i))) {
+                Severity::Note
+            } else {
+                Severity::Warning
+            },
             element: subject.instance_element(i),
             count: triangles.len(),
             area: twice,

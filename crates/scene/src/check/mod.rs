@@ -54,7 +54,7 @@ impl Default for CheckOptions {
 pub fn check(scene: &Scene, patches: &PatchScene, cameras: &[Camera], options: &CheckOptions) -> Vec<Finding> {
     let subject = Subject::new(scene, patches);
     let walks = Walks::new(&subject, cameras);
-    let mut found = units::find(&subject);
+    let mut found = units::find(&subject, &walks);
     found.extend(degenerate::find(&subject));
     found.extend(duplicates::find(&subject));
     found.extend(normals::find(&subject));

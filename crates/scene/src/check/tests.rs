@@ -114,6 +114,23 @@ fn units() {
 }
 
 #[test]
+fn rooms_in_centimetres() {
+    // A cube of 3 m seen from inside is no kilometre across in centimetres.
+    let seen = |half: f32| {
+        let mut mesh = cube(1, half);
+        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let mut scene = alone(mesh);
+        scene.cameras.push(Camera::look_at("c", DVec3::ZERO, DVec3::X, DVec3::Y, 90.0));
+        scene
+    };
+    misses(&seen(1.5), Kind::Units);
+    // A hall of 50 m is large, and is one.
+    misses(&seen(25.0), Kind::Units);
+    let found = finds(&seen(150.0), Kind::Units);
+    assert!(found.worst.value > 100.0 && found.worst.value < 300.0, "{found:?}");
+}
+
+#[test]
 fn walls_that_turn_their_backs() {
     misses(&room(), Kind::FlippedNormals);
     let mut scene = room();
@@ -179,6 +196,42 @@ fn windows_do_not_leak() {
     misses(&scene, Kind::Leak);
 }
 
+/// A cube of 2 m seen from inside; one of its walls has a window of `window` metres a side, and another ends `gap` metres
+/// before the edge. Bars of 5 cm stand in the window, `pitch` from each other if that is not 0.
+fn glazed(window: f32, gap: f32, pitch: f32) -> Scene {
+    let mut mesh = cube(1, 1.0);
+    mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    // The last wall, at z = 1, becomes a frame.
+    mesh.triangles.truncate(10);
+    mesh.positions.truncate(20);
+    let mut rectangle = |[x0, y0]: [f32; 2], [x1, y1]: [f32; 2]| {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([[x0, y0, 1.0], [x0, y1, 1.0], [x1, y1, 1.0], [x1, y0, 1.0]]);
+        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    };
+    let half = 0.5 * window;
+    rectangle([-1.0, -1.0], [-half, 1.0]);
+    rectangle([half, -1.0], [1.0 - gap, 1.0]);
+    rectangle([-half, -1.0], [half, -half]);
+    rectangle([-half, half], [half, 1.0]);
+    for k in 0..if pitch > 0.0 { (window / pitch) as u32 } else { 0 } {
+        let x = -half + pitch * (k + 1) as f32;
+        rectangle([x - 0.05, -half], [x, half]);
+    }
+    let mut scene = alone(mesh);
+    scene.cameras.push(Camera::look_at("c", DVec3::ZERO, DVec3::X, DVec3::Y, 90.0));
+    scene
+}
+
+#[test]
+fn slits_beside_windows_leak() {
+    for pitch in [0.0, 0.1, 0.2] {
+        misses(&glazed(1.0, 0.0, pitch), Kind::Leak);
+    }
+    let found = finds(&glazed(1.0, 0.02, 0.0), Kind::Leak);
+    assert!(found.severity == Severity::Warning && found.worst.value > 0.01, "{found:?}");
+}
+
 #[test]
 fn surfaces_twice_in_one_place() {
     let mut scene = alone(sheet(2, 1.0));
@@ -201,6 +254,10 @@ fn surfaces_twice_in_one_place() {
         .sum();
     // Half of the first, half of the second, all of the third.
     assert!((area - 2.0).abs() < 1e-6, "{area}");
+    // All of one that is next to nothing in a hall.
+    let mut hall = alone(cube(1, 20.0));
+    (0..2).for_each(|_| place(&mut hall, sheet(1, 0.02)));
+    assert_eq!(finds(&hall, Kind::CoplanarDuplicates).severity, Severity::Note);
 }
 
 #[test]

@@ -2,10 +2,17 @@
 
 use super::finding::{Element, Finding, Kind, Severity, Worst};
 use super::subject::Subject;
+use super::walks::Walks;
 use crate::authored::LightKind;
 
 /// Diagonals of scenes that are lit as rooms, streets or furniture, metres.
 const SIZES: [f64; 2] = [0.5, 1000.0];
+
+/// What light travels from surface to surface on average, metres: 2 in rooms, 15 in cathedrals, 60 in stadiums. A small room in
+/// centimetres has more than 100, and is not a kilometre across.
+const FREE: f64 = 80.0;
+/// Fewer rays have no average.
+const RAYS: usize = 1000;
 
 /// Mean illuminance of surfaces by lamps, lx (or W/m²): from below moonlight to above sunlight.
 const LEVELS: [f64; 2] = [0.1, 1e6];
@@ -13,7 +20,7 @@ const LEVELS: [f64; 2] = [0.1, 1e6];
 /// More than any sun gives, lx.
 const SUN: f64 = 2e5;
 
-pub fn find(subject: &Subject) -> Vec<Finding> {
+pub fn find(subject: &Subject, walks: &Walks) -> Vec<Finding> {
     let mut found = Vec::new();
     let area = subject.patches.total_area();
     let mut report = |element, area, value, unit, message| {
@@ -22,6 +29,7 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
         found.push(Finding { kind, severity, element, count: 1, area, worst, message, triangles: Vec::new() });
     };
     let size = subject.diagonal();
+    let free = free_path(walks).filter(|&free| free > FREE);
     if size < SIZES[0] {
         let message =
             format!("{size:.4} m from corner to corner: smaller than a shoe box, lengths may not be in metres");
@@ -29,6 +37,11 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
     } else if size > SIZES[1] {
         let message = format!("{size:.0} m from corner to corner: lengths may be in millimetres or centimetres");
         report(Element::Scene, area, size, "m", message);
+    } else if let Some(free) = free {
+        let message = format!(
+            "light travels {free:.0} m from surface to surface on average, as in no room: lengths may be in millimetres or centimetres"
+        );
+        report(Element::Scene, area, free, "m", message);
     }
     let power = (subject.patches.emitted_power() + subject.patches.near_lights_power()).luminance();
     let level = power / area;
@@ -47,4 +60,11 @@ pub fn find(subject: &Subject) -> Vec<Finding> {
         }
     }
     found
+}
+
+/// What rays travel from surface to surface on average, metres, if enough of them meet one.
+fn free_path(walks: &Walks) -> Option<f64> {
+    let lengths = || walks.0.iter().filter(|step| step.from.is_some()).filter_map(|step| step.hit).map(|hit| hit.t);
+    let count = lengths().count();
+    (count >= RAYS).then(|| lengths().sum::<f64>() / count as f64)
 }
