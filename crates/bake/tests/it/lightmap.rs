@@ -1,7 +1,7 @@
 //! Lightmaps of scenes whose light is known.
 
 use glam::{DAffine3, DVec3};
-use twinray_bake::{AtlasOptions, Layout, Lightmap, LightmapOptions, Quality, TexelDensity, bake};
+use twinray_bake::{Atlas, AtlasOptions, Layout, Lightmap, LightmapOptions, Quality, TexelDensity, bake};
 use twinray_scene::{PatchScene, Rgb, Scene, Side, builtin};
 use twinray_solve::Solution;
 
@@ -239,5 +239,47 @@ fn mirrored_instances_are_drawn_from_their_front() {
         let drawn = part.drawn(face.corners);
         let turned = (0..3).any(|k| [drawn[k], drawn[(k + 1) % 3], drawn[(k + 2) % 3]] == *original);
         assert!(turned, "{drawn:?} against {original:?}");
+    }
+}
+
+/// Thousands of charts are put in rows instead of being nested; they keep their distance like others.
+#[test]
+fn many_charts_keep_their_distance() {
+    let mut room = Boxes::new();
+    let (glowing, grey) = (room.material(0.5, 1.0), room.material(0.5, 0.0));
+    room.add([0.0; 3], [3.2, 3.2, 3.2], glowing, true);
+    room.add([0.1; 3], [0.15, 0.16, 0.17], grey, false);
+    for k in 1..1000 {
+        let [x, y, z] = [k % 10, k / 10 % 10, k / 100].map(|c| 0.3 * f64::from(c));
+        room.place(1, DAffine3::from_translation(DVec3::new(x, y, z)));
+    }
+    let scene = room.0;
+    let patches = cut(&scene, 1.0);
+    let parts = twinray_bake::parts(&scene, &patches, &solve(&patches, 400_000));
+    let padding = 2;
+    let options = AtlasOptions { page_size: 1024, padding, ..AtlasOptions::default() };
+    let atlas = Atlas::new(&scene, &patches, &parts, &options).expect("charts");
+    assert!(atlas.charts > Some(5000), "{:?}", atlas.charts);
+    let [width, height] = atlas.pages[0].map(i64::from);
+    let mut owner = vec![None; (width * height) as usize];
+    let mut number = 0;
+    for laid in &atlas.parts {
+        // Two triangles of one side of a box make a chart.
+        for pair in laid.triangles.chunks_exact(2) {
+            let texels = |axis: usize, size: i64| {
+                let at = pair.iter().flatten().map(|&k| f64::from(laid.vertices[k as usize].uv[axis]) * size as f64);
+                let (low, high) = at.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
+                // Roundings of half a thousandth of a texel are no texel.
+                ((low + 5e-4).floor() as i64 - i64::from(padding)).max(0)
+                    ..((high - 5e-4).ceil() as i64 + i64::from(padding)).min(size)
+            };
+            for y in texels(1, height) {
+                for x in texels(0, width) {
+                    let owner = &mut owner[(y * width + x) as usize];
+                    assert_eq!(*owner.get_or_insert(number), number, "charts meet at {x}, {y}");
+                }
+            }
+            number += 1;
+        }
     }
 }
