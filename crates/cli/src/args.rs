@@ -37,6 +37,10 @@ pub enum Command {
     /// Say what is in a scene (triangles, patches, power, closedness, memory, warnings), or in a .twin file
     Info(InfoArgs),
     /// Find what ruins a bake before it is paid for: units, flipped normals, leaks, unwrapping, and more
+    #[command(
+        mut_arg("scene", |a| a.help("A .glb, .gltf or .obj file, or the name of a built-in scene")),
+        mut_arg("scene_file", |a| a.hide(true))
+    )]
     Check(Box<CheckArgs>),
     /// Write the light of every patch as a table or a mesh for other programs, or a walk-through as one HTML file
     Export(ExportArgs),
