@@ -515,7 +515,7 @@ pub struct BakeArgs {
     #[arg(long)]
     pub keep_lights: bool,
     /// Of --for unlit: stops by which pictures are brighter [default: by the light that there is]
-    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", value_parser = stops, allow_negative_numbers = true)]
     pub exposure: Option<f64>,
 }
 
@@ -555,6 +555,11 @@ pub enum QualityArg {
     Smooth,
     /// Gathered anew at each texel: sharp shadows, and slower.
     High,
+}
+
+fn stops(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number, such as -2".to_owned())?;
+    if value.abs() <= 64.0 { Ok(value) } else { Err("expected -64 to 64 stops".into()) }
 }
 
 fn above_zero(text: &str) -> Result<f64, String> {

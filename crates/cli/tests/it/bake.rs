@@ -104,7 +104,27 @@ fn engines_get_what_they_load() {
     let vertex = document(&place, "lit.glb");
     let primitive = &vertex["meshes"][0]["primitives"][0];
     assert!(primitive["attributes"]["_IRRADIANCE"].is_u64() && primitive["attributes"]["COLOR_0"].is_u64());
-    assert!(vertex["meshes"][0]["extras"]["twinray_irradiance_scale"].as_f64().unwrap() > 0.0);
+    // One white for all meshes, so that they are as bright as they are beside each other.
+    let white = |mesh: &Value| mesh["extras"]["twinray_irradiance_scale"].as_f64().unwrap();
+    let whites: Vec<f64> = vertex["meshes"].as_array().unwrap().iter().map(white).collect();
+    assert!(whites.len() > 1 && whites[0] > 0.0 && whites.iter().all(|w| *w == whites[0]), "{whites:?}");
+}
+
+/// The scene is not overwritten by its own bake, and light is not baked into what has it.
+#[test]
+fn a_scene_is_baked_once_and_kept() {
+    let place = Place::new();
+    place.done(&["scene", "cornell", "-o", "plain.glb"]);
+    let scene = place.read("plain.glb");
+    let again = |scene: &str, output: &str| place.run(&[&["bake", scene, "-o", output], &TINY[..]].concat());
+    let onto_itself = again("plain.glb", "./plain.glb");
+    assert_eq!((onto_itself.code, place.read("plain.glb") == scene), (Some(2), true), "{}", onto_itself.stderr);
+    assert!(onto_itself.stderr.contains("the scene itself"), "{}", onto_itself.stderr);
+    assert_eq!(again("plain.glb", "lit.glb").code, Some(0));
+    let twice = again("lit.glb", "twice.glb");
+    assert_eq!(twice.code, Some(2), "{}", twice.stderr);
+    assert!(twice.stderr.contains("baked light in it already"), "{}", twice.stderr);
+    assert_eq!(place.files().len(), 2);
 }
 
 /// A grid of probes in every kind of file, and the numbers of the one that is read most easily.
@@ -166,6 +186,10 @@ fn what_makes_no_sense_is_refused() {
     let place = Place::new();
     for (args, expected) in [
         (&["bake", "cornell", "-o", "lit.png"][..], ".glb"),
+        (&["bake", "cornell", "-o", "lit.glb", "--density", "1e9"], "texels per metre here"),
+        (&["bake", "cornell", "-o", "lit.glb", "--for", "unlit", "--exposure", "nan"], "stops"),
+        (&["bake", "cornell", "-o", "lit.glb", "--to", "vertex", "--unwrap"], "is for lightmaps"),
+        (&["bake", "cornell", "-o", "lit.glb", "--spacing", "1"], "is for probes"),
         (&["bake", "cornell", "--density", "0"], "a positive number"),
         (&["bake", "cornell", "--exposure", "1"], "--for unlit"),
         (&["bake", "cornell", "--to", "vertex", "--for", "unlit"], "leave one"),

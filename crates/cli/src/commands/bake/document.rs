@@ -52,6 +52,20 @@ impl Document {
     }
 }
 
+/// True of a file that a bake has written.
+pub fn is_baked(path: &Path, most: u64) -> bool {
+    let Ok(bytes) = files::read(path, most) else { return false };
+    let json = match bytes.first_chunk::<20>() {
+        Some(head) if head.starts_with(b"glTF") => {
+            let length = u32::from_le_bytes([head[12], head[13], head[14], head[15]]) as usize;
+            bytes.get(20..).and_then(|rest| rest.get(..length))
+        }
+        _ => Some(bytes.as_slice()),
+    };
+    let value = json.and_then(|json| serde_json::from_slice::<serde_json::Value>(json).ok());
+    value.is_some_and(|v| !v["asset"]["extras"]["twinray_bake"].is_null())
+}
+
 /// Where `write_glb` puts instances: a node each, and a mesh of one primitive for each mesh that has triangles.
 fn origins(scene: &Scene) -> Vec<Option<Origin>> {
     let mut meshes = 0;

@@ -31,6 +31,8 @@ use crate::{interrupt, stored};
 
 /// Patches that a density may ask for by itself.
 const MOST_CELLS: f64 = 1e6;
+/// The most texels that a density may ask for: 32 pages of 2048 × 2048, some 7 GB while they are filled.
+const MOST_TEXELS: f64 = 134_217_728.0;
 /// Side of a page where the user does not say, with a density and without.
 const PAGE: [u32; 2] = [2048, 1024];
 
@@ -48,6 +50,7 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     let load = with_cells(args)?;
     let mut loaded = input::load(load.as_ref().unwrap_or(&args.load), None, &Work { keeps_scene: true, ..work })?;
     let Some(scene) = loaded.scene.take() else { unreachable!("it was asked for") };
+    check_scene(args, &loaded, &path)?;
     let mut output = Output::open(&path)?;
     commands::print_warnings(&loaded.warnings, args.load.quiet);
     let document = match carrier {
@@ -160,8 +163,43 @@ fn check(args: &BakeArgs, carrier: CarrierArg, path: &Path) -> anyhow::Result<()
     if carrier == CarrierArg::Vertex && args.engine == Some(EngineArg::Unlit) {
         bail!("--to vertex --for unlit: colours as they look need textures: leave one of the two out");
     }
+    if carrier != CarrierArg::Lightmap {
+        let given =
+            [("--page-size", args.page_size.is_some()), ("--unwrap", args.unwrap), ("--no-stitch", args.no_stitch)];
+        if let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) {
+            bail!("{option} is for lightmaps: leave it or --to out");
+        }
+    }
+    if carrier != CarrierArg::Probes && args.spacing.is_some() {
+        bail!("--spacing is for probes: add --to probes");
+    }
     if args.exposure.is_some() && args.engine != Some(EngineArg::Unlit) {
         bail!("--exposure is for --for unlit: lightmaps hold light in the units of the scene");
+    }
+    Ok(())
+}
+
+/// What only the scene tells.
+fn check_scene(args: &BakeArgs, loaded: &Loaded, path: &Path) -> anyhow::Result<()> {
+    let file = loaded.scene_file();
+    let real = |p: &Path| std::fs::canonicalize(p).ok();
+    if real(path).is_some_and(|p| Some(p) == real(Path::new(file))) {
+        bail!("{}: is the scene itself, which would be lost: give another name to -o", path.display());
+    }
+    if document::is_baked(Path::new(file), input::limits(&args.load.read).max_file_bytes) {
+        bail!(
+            "{file}: has baked light in it already (asset.extras.twinray_bake): bake the scene that it was made from"
+        );
+    }
+    if let Some(density) = args.density {
+        let area = loaded.patches.total_area();
+        if area * density * density > MOST_TEXELS {
+            bail!(
+                "--density {density}: {:.3e} texels for {area:.3} m² of surface: expected at most {:.3} texels per metre here",
+                area * density * density,
+                (MOST_TEXELS / area).sqrt()
+            );
+        }
     }
     Ok(())
 }
@@ -261,7 +299,9 @@ fn bake(
 
 /// What a second signal, or one after the solve, leaves to be said.
 fn stopped(name: &str) -> anyhow::Error {
-    anyhow!("{name}: stopped before anything could be written")
+    anyhow!(
+        "{name}: stopped before anything could be written (`twinray solve` keeps the light in a .twin file, which `bake` takes)"
+    )
 }
 
 /// The factor of pictures: what `--exposure` says, or that of a picture from the scene's first camera.

@@ -60,8 +60,8 @@ pub struct LitVertex {
     pub source: u32,
     /// `TEXCOORD_1`.
     pub texcoord: Option<[f32; 2]>,
-    /// Irradiance, W·m⁻² (or lux): `_IRRADIANCE`, and in `COLOR_0` as a part of the largest of the node's, which is the mesh's
-    /// extra `twinray_irradiance_scale`.
+    /// Irradiance, W·m⁻² (or lux): `_IRRADIANCE`, and in `COLOR_0` as a part of the largest of all, which is the extra
+    /// `twinray_irradiance_scale` of every mesh.
     pub irradiance: Option<[f32; 3]>,
 }
 
@@ -152,12 +152,15 @@ pub fn write_lit_glb(
     let mut geometry = Geometry::new(&root, &buffers);
     let mut materials = Materials::new(&original, lit);
     let nodes = by_node(origins, lit);
+    // One white for the whole file: viewers that know of no scale show meshes as bright as they are beside each other.
+    let irradiance = lit.surfaces.iter().flat_map(|s| &s.vertices).filter_map(|v| v.irradiance);
+    let scale = irradiance.map(|i| i.into_iter().fold(0.0, f32::max)).reduce(f32::max);
     let mut meshes = Meshes::new(&original, nodes.keys().copied());
     for (&node, primitives) in &nodes {
         let Some((_, first)) = primitives.values().flatten().next() else { continue };
         let Some(mesh) = root.item("meshes", first.mesh).filter(Element::is_object) else { continue };
         let Some(value) = document["nodes"].get_mut(node).and_then(Value::as_object_mut) else { continue };
-        let made = lit_mesh(&mut context, &mesh, primitives, &mut geometry, &mut materials)?;
+        let made = lit_mesh(&mut context, &mesh, primitives, scale, &mut geometry, &mut materials)?;
         value.insert("mesh".into(), json!(meshes.put(first.mesh, made)));
     }
     if !meshes.list.is_empty() {
@@ -193,13 +196,12 @@ fn lit_mesh(
     context: &mut Context<'_>,
     mesh: &Element<'_>,
     primitives: &Primitives<'_>,
+    scale: Option<f32>,
     geometry: &mut Geometry<'_, '_>,
     materials: &mut Materials<'_>,
 ) -> Result<Value, FormatError> {
-    // All primitives of a mesh share what is white.
-    let surfaces = primitives.values().flatten().map(|(surface, _)| *surface);
-    let irradiance = surfaces.flat_map(|s| &s.vertices).filter_map(|v| v.irradiance);
-    let scale = irradiance.map(|i| i.into_iter().fold(0.0, f32::max)).reduce(f32::max);
+    let surfaces = || primitives.values().flatten().map(|(surface, _)| *surface);
+    let scale = scale.filter(|_| surfaces().any(|s| s.vertices.iter().any(|v| v.irradiance.is_some())));
     let mut list = Vec::new();
     for (k, primitive) in mesh.items("primitives")?.enumerate() {
         let Some(surfaces) = primitives.get(&k) else {
