@@ -52,8 +52,8 @@ impl Document {
     }
 }
 
-/// True of a file that a bake has written.
-pub fn is_baked(path: &Path, most: u64) -> bool {
+/// True of a file that a bake has written without the lights that it baked.
+pub fn has_lost_lights(path: &Path, most: u64) -> bool {
     let Ok(bytes) = files::read(path, most) else { return false };
     let json = match bytes.first_chunk::<20>() {
         Some(head) if head.starts_with(b"glTF") => {
@@ -63,7 +63,10 @@ pub fn is_baked(path: &Path, most: u64) -> bool {
         _ => Some(bytes.as_slice()),
     };
     let value = json.and_then(|json| serde_json::from_slice::<serde_json::Value>(json).ok());
-    value.is_some_and(|v| !v["asset"]["extras"]["twinray_bake"].is_null())
+    value.is_some_and(|v| {
+        let baked = &v["asset"]["extras"]["twinray_bake"]["lights"]["punctual"];
+        baked.as_array().is_some_and(|lights| !lights.is_empty()) && v["extensions"]["KHR_lights_punctual"].is_null()
+    })
 }
 
 /// Where `write_glb` puts instances: a node each, and a mesh of one primitive for each mesh that has triangles.

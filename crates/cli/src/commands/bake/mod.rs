@@ -186,9 +186,9 @@ fn check_scene(args: &BakeArgs, loaded: &Loaded, path: &Path) -> anyhow::Result<
     if real(path).is_some_and(|p| Some(p) == real(Path::new(file))) {
         bail!("{}: is the scene itself, which would be lost: give another name to -o", path.display());
     }
-    if document::is_baked(Path::new(file), input::limits(&args.load.read).max_file_bytes) {
+    if document::has_lost_lights(Path::new(file), input::limits(&args.load.read).max_file_bytes) {
         bail!(
-            "{file}: has baked light in it already (asset.extras.twinray_bake): bake the scene that it was made from"
+            "{file}: was baked already, and the lights that were are no longer in it: bake the scene that it was made from, or that with --keep-lights"
         );
     }
     if let Some(density) = args.density {
