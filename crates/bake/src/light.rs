@@ -8,6 +8,9 @@ use twinray_solve::Solution;
 
 use crate::texels::PagePoint;
 
+/// A surface closer than this share of a cell's side covers a point.
+const TOUCHING: f64 = 0.02;
+
 /// Whence the light of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
@@ -53,7 +56,8 @@ impl<'a> SurfaceLight<'a> {
     pub fn at(&self, triangle: u32, side: Side, [u, v]: [f64; 2], key: u64, rays: Range<u32>) -> Option<Rgb> {
         let patch = self.patches.patch_at(triangle, side, u, v)?;
         let hit = SurfaceHit { triangle, side, u, v, t: 0.0 };
-        if self.is_covered(&hit) {
+        let touching = TOUCHING * self.patches.cell_area(patch).sqrt();
+        if self.patches.is_covered(patch, self.patches.point_of(triangle, u, v), touching) {
             return None;
         }
         Some(match &self.source {
@@ -69,14 +73,5 @@ impl<'a> SurfaceLight<'a> {
         let first = number(point.before);
         let rays = first..number(point.before + point.share).max(first + 1);
         self.at(point.triangle, point.side, point.place, point.key, rays)
-    }
-
-    /// True if what is met along the normal touches the point, or is the absorbing back of something that the point lies within.
-    fn is_covered(&self, hit: &SurfaceHit) -> bool {
-        let Some(patch) = self.patches.patch_at(hit.triangle, hit.side, hit.u, hit.v) else { return true };
-        let point = self.patches.point_of(hit.triangle, hit.u, hit.v);
-        let met = self.patches.trace_from(patch, point, self.patches.normal(patch));
-        let touching = 0.02 * self.patches.cell_area(patch).sqrt();
-        met.is_some_and(|m| m.t < touching || (m.side == Side::Back && self.patches.patch_of(&m).is_none()))
     }
 }

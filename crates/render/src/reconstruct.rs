@@ -8,7 +8,7 @@
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use twinray_scene::{PatchId, PatchScene, Rgb, Side, SurfaceHit};
+use twinray_scene::{PatchId, PatchScene, Rgb, SurfaceHit};
 use twinray_solve::Solution;
 
 use crate::element::{Element, Elements};
@@ -22,7 +22,7 @@ const MOST_NEIGHBOURS: usize = 72;
 const SAME_NORMAL: f64 = 0.8;
 /// Rise over run off the tangent plane beyond which surfaces are not the same.
 const SAME_PLANE: f64 = 0.35;
-/// A surface closer than this share of a cell covers it.
+/// A surface closer than this share of a typical cell's side covers a point.
 const TOUCHING: f64 = 0.05;
 /// Points at which a suspicious cell is tested for what covers it.
 const COVER_TESTS: u32 = 24;
@@ -39,7 +39,7 @@ const NEIGHBOURS_OF_SLIVER: usize = 8;
 #[derive(Clone, Copy, Debug)]
 struct Part {
     origin: DVec3,
-    /// Its share of the cell: the covered rest gets no light, and would show as a dark rim.
+    /// Its share of the cell. What is covered gets no light, and would show as a dark rim: a cell's light is that of all its parts.
     share: f64,
 }
 
@@ -173,7 +173,9 @@ impl<'a> Reconstruction<'a> {
         let (mut total, mut lobe_total) = (0.0, 0.0);
         for &(other, part) in neighbours {
             let element = self.element(other);
-            let Part { origin, share } = self.parts(other)[usize::from(part)];
+            let parts = self.parts(other);
+            let Part { origin, share } = parts[usize::from(part)];
+            let free: f64 = parts.iter().map(|p| p.share).sum();
             let radius = if let Kernel::Wide(reach) = kernel { reach } else { self.radius(element) };
             let offset = origin - place.x;
             let distance_squared = offset.length_squared();
@@ -184,17 +186,18 @@ impl<'a> Reconstruction<'a> {
             let rise = place.rise(offset, element.normal) / distance_squared.sqrt().max(1e-12);
             let plane = fade(SAME_PLANE - rise, 0.15);
             let turn = fade(place.n.dot(element.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
-            // A cell that is half covered says less, and says it with the error of its share.
-            let trust = element.area * share * share * share;
+            // A cell that is half covered says less, and says it with the error of its share; one in several parts does not say
+            // which of them has its light.
+            let trust = element.area * share * share * share * (share / free).powi(2);
             let weight = closeness * closeness * plane * turn * trust;
-            sum.irradiance += element.irradiance * (weight / share);
+            sum.irradiance += element.irradiance * (weight / free);
             total += weight;
             if own.lobe.is_some()
                 && let Some(lobe) = element.lobe
                 && std::ptr::eq(self.scene.material(element.patch), material)
             {
-                sum.lobe[0] += lobe[0] * (weight / share);
-                sum.lobe[1] += lobe[1] * (weight / share);
+                sum.lobe[0] += lobe[0] * (weight / free);
+                sum.lobe[1] += lobe[1] * (weight / free);
                 lobe_total += weight;
             }
         }
@@ -290,7 +293,8 @@ impl<'a> Reconstruction<'a> {
             witnesses.truncate(8);
             let seen = witnesses.iter().filter(|&&w| self.sees(centre, normal, w, self.element(w).centre)).count();
             let mut corners = (1..=4).map(|k| self.spread_point(patch, k));
-            let free = |p: DVec3| !self.covered(patch, p);
+            let touching = TOUCHING * self.surfaces.elements.typical_size;
+            let free = |p: DVec3| !self.scene.is_covered(patch, p, touching);
             if free(centre)
                 && seen * 6 >= witnesses.len() * 5
                 && corners.all(|c| free(c) && self.sees(centre, normal, element, c))
@@ -312,15 +316,6 @@ impl<'a> Reconstruction<'a> {
                 points = rest;
             }
             parts.into_boxed_slice()
-        })
-    }
-
-    /// True if nothing can light the point: along the normal it meets a back, or something that touches it.
-    fn covered(&self, patch: PatchId, point: DVec3) -> bool {
-        let scene = self.scene;
-        scene.trace_from(patch, point, scene.normal(patch)).is_some_and(|hit| {
-            hit.t < TOUCHING * self.surfaces.elements.typical_size
-                || (hit.side == Side::Back && scene.patch_of(&hit).is_none())
         })
     }
 

@@ -1,8 +1,11 @@
-//! What a straight line of sight lets through: nothing beyond surfaces, a part beyond clear panes.
+//! What a straight line of sight lets through: nothing beyond surfaces, a part beyond clear panes; and which points no light
+//! reaches at all.
 //!
 //! Panes do not bend light, so that shadow rays may follow it through them. Bodies of glass with parallel faces, as windows
 //! are often drawn, let it out in the direction in which it came, a little aside, which is neglected. Not here: other
 //! bodies of glass, behind which only paths that are bent find light.
+
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 
@@ -15,6 +18,10 @@ use crate::rgb::Rgb;
 const PARALLEL: f64 = 1.0 - 1e-9;
 /// Panes behind each other that are looked through.
 const MOST_PANES: u32 = 16;
+/// The share of the way to the middle of its cell by which a point is moved before it is asked whether something covers it.
+const INWARDS: f64 = 0.01;
+/// Directions, all 60° from the normal, in which a point within a body has to meet the body's inside.
+const OBLIQUE: u32 = 6;
 
 impl PatchScene {
     /// The share of light that passes the open segment between two points above surfaces: 0 or 1 but for panes. The
@@ -44,6 +51,33 @@ impl PatchScene {
             return if hit.is_none() { Rgb::WHITE } else { Rgb::BLACK };
         }
         self.through_panes(point, towards, hit, f64::INFINITY)
+    }
+
+    /// True if nothing can light a point of `patch`: along the normal it meets something within `touching`, or it lies within a
+    /// body, whose absorbing inside it meets in all directions that are tried. An absorbing back above it alone, as that of a
+    /// leaf, leaves light a way from the side.
+    pub fn is_covered(&self, patch: PatchId, point: DVec3, touching: f64) -> bool {
+        let normal = self.normal(patch);
+        // On an edge, a ray would pass between the faces of a body that meet there.
+        let point = point.lerp(self.cell_centre(patch), INWARDS);
+        let Some(above) = self.trace_from(patch, point, normal) else { return false };
+        if above.t < touching {
+            return true;
+        }
+        let (a, b) = normal.any_orthonormal_pair();
+        let mut oblique = (0..OBLIQUE).map(|k| {
+            let (sin, cos) = (TAU * f64::from(k) / f64::from(OBLIQUE)).sin_cos();
+            0.5 * normal + 0.75_f64.sqrt() * (cos * a + sin * b)
+        });
+        self.absorbs(&above)
+            && oblique.all(|towards| {
+                let met = self.trace_from(patch, point, towards);
+                met.is_some_and(|met| met.t < touching || self.absorbs(&met))
+            })
+    }
+
+    fn absorbs(&self, hit: &SurfaceHit) -> bool {
+        hit.side == Side::Back && self.patch_of(hit).is_none()
     }
 
     /// What panes let through up to parameter `end` of a ray whose first hit is known.

@@ -1,7 +1,9 @@
 //! Lightmaps of scenes whose light is known.
 
+use std::f64::consts::PI;
+
 use glam::{DAffine3, DVec3};
-use twinray_bake::{Atlas, AtlasOptions, Layout, Lightmap, LightmapOptions, Quality, TexelDensity, bake};
+use twinray_bake::{Atlas, AtlasOptions, Layout, Lightmap, LightmapOptions, Quality, SurfaceLight, TexelDensity, bake};
 use twinray_scene::{PatchScene, Rgb, Scene, Side, builtin};
 use twinray_solve::Solution;
 
@@ -156,6 +158,62 @@ fn tiles_meet_without_a_line() {
     // What was moved is little: the light is still that of the solution.
     let [found, truth] = means(&stitched, &patches, &solution);
     assert!((found / truth - 1.0).abs() < 0.02, "{found} against {truth}");
+}
+
+/// The back of a leaf absorbs what comes from below; what comes past the leaf still lights the ground under it.
+#[test]
+fn the_ground_under_a_leaf_is_lit_from_the_sides() {
+    let (a, h) = (0.1f32, 0.15f32);
+    let mut garden = Boxes::new();
+    let (grey, black) = (garden.material(0.5, 0.0), garden.material(0.0, 0.0));
+    garden.add([-1.0, -0.1, -1.0], [1.0, 0.0, 1.0], grey, false);
+    garden.add([-a, h - 0.1, -a], [a, h, a], black, false);
+    let leaf = garden.0.meshes.last_mut().expect("a mesh");
+    leaf.triangles.retain(|t| t.iter().all(|&k| leaf.positions[k as usize][1] == h));
+    let scene = Scene { environment: Some(twinray_scene::Environment::Uniform(Rgb::WHITE)), ..garden.0 };
+    let patches = cut(&scene, 0.04);
+    let solution = solve(&patches, 4_000_000);
+    // The form factor of a parallel square from below its middle, as four of its corner (Siegel and Howell, configuration B-4).
+    let x = f64::from(a / h);
+    let root = (1.0 + x * x).sqrt();
+    let expected = PI * (1.0 - 4.0 * 2.0 * x / root * (x / root).atan() / (2.0 * PI));
+    let from = DVec3::new(0.011, 0.001, 0.007) - patches.centre();
+    let below = patches.trace(from, DVec3::NEG_Y).expect("the ground");
+    for quality in [Quality::Cells, Quality::Smooth, Quality::Gathered(4096)] {
+        let light = SurfaceLight::new(&patches, &solution, quality, 1);
+        let found = light.at(below.triangle, below.side, [below.u, below.v], 7, 0..light.rays()).expect("light");
+        assert!((found.luminance() / expected - 1.0).abs() < 0.06, "{quality:?}: {found:?} against {expected}");
+    }
+}
+
+/// Cells that walls divide have no more light than fell on them, on whichever side of the wall it did.
+#[test]
+fn cells_between_slats_keep_their_light() {
+    let mut blinds = Boxes::new();
+    let (grey, black) = (blinds.material(0.5, 0.0), blinds.material(0.0, 0.0));
+    blinds.add([0.0, -0.1, 0.0], [1.0, 0.0, 1.0], grey, false);
+    for k in 0..19 {
+        let x = 0.05 * (k + 1) as f32 + 0.013;
+        blinds.add([x, 0.0, 0.0], [x + 0.002, 0.06, 1.0], black, false);
+    }
+    let scene = Scene { environment: Some(twinray_scene::Environment::Uniform(Rgb::WHITE)), ..blinds.0 };
+    let patches = cut(&scene, 0.1);
+    let solution = solve(&patches, 2_000_000);
+    let smooth = SurfaceLight::new(&patches, &solution, Quality::Smooth, 1);
+    let [mut arrived, mut found] = [0.0; 2];
+    for i in 0..60 {
+        for j in 0..60 {
+            let place = |k: i32| 0.1 + 0.8 * (f64::from(k) + 0.5) / 60.0;
+            let above = DVec3::new(place(i), 0.001, place(j)) - patches.centre();
+            let Some(hit) = patches.trace(above, DVec3::NEG_Y) else { continue };
+            let Some(light) = smooth.at(hit.triangle, hit.side, [hit.u, hit.v], 7, 0..1) else { continue };
+            let patch = patches.patch_at(hit.triangle, hit.side, hit.u, hit.v).expect("the ground's cell");
+            arrived += solution.irradiance(patch).luminance();
+            found += light.luminance();
+        }
+    }
+    // What stands under slats gets no light: a twenty-fifth of the ground.
+    assert!((0.96 * found / arrived - 1.0).abs() < 0.03, "{found} against {arrived}");
 }
 
 /// A sheet that is lit on both sides has both lights.
