@@ -12,11 +12,12 @@ use crate::atlas::Atlas;
 use crate::clip::{cross, range, texels_of};
 use crate::page::Page;
 use crate::parts::Part;
-use crate::watch::{Cancelled, Stage, Watch};
+use crate::watch::{Cancelled, Pace, Stage, Watch};
 
-/// Texels of one task, about, and tasks whose pieces are held at once.
-const TASK: u32 = 1024;
-const BATCH: usize = 512;
+/// Texels of one task, about.
+const TASK: u32 = 256;
+/// Tasks whose pieces are held at once, at most.
+const BATCH: usize = 2048;
 
 /// A point of a page: where it is on the surface.
 #[derive(Clone, Copy, Debug)]
@@ -72,8 +73,10 @@ pub fn fill(
     let mut charted: Vec<Vec<bool>> = pages.iter().map(|p| vec![false; p.coverage.len()]).collect();
     let mut sums: Vec<Vec<[f64; 4]>> = pages.iter().map(|p| vec![[0.0; 4]; p.coverage.len()]).collect();
     let tasks = tasks(atlas, parts);
+    let mut pace = Pace::new(BATCH);
     let mut done = 0;
-    for batch in tasks.chunks(BATCH) {
+    while done < tasks.len() {
+        let batch = &tasks[done..(done + pace.next()).min(tasks.len())];
         let found: Vec<Vec<Piece>> = batch.par_iter().map(|task| pieces(atlas, parts, task, value)).collect();
         for piece in found.iter().flatten() {
             let (page, texel) = (piece.page as usize, piece.texel as usize);

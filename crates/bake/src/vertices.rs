@@ -10,7 +10,7 @@ use twinray_solve::Solution;
 use crate::atlas::{AtlasError, area};
 use crate::light::{Quality, SurfaceLight};
 use crate::parts::{Part, parts};
-use crate::watch::{Stage, Watch};
+use crate::watch::{Pace, Stage, Watch};
 
 /// Weight of the smoothness of neighbours beside the light itself.
 const SMOOTH: f64 = 0.02;
@@ -19,7 +19,7 @@ const STEPS: usize = 40;
 const ROUNDS: usize = 8;
 /// Points at which the light of a face is asked for, at least and at most.
 const POINTS: [f64; 2] = [16.0, 1024.0];
-/// Faces between two looks at who may want to stop.
+/// Faces between two looks at who may want to stop, at most.
 const BATCH: usize = 4096;
 
 /// Irradiance at the vertices of the meshes.
@@ -50,11 +50,13 @@ pub fn bake_vertices(
     let light = SurfaceLight::new(patches, solution, quality, seed);
     let faces = parts.iter().map(|p| p.faces.len()).sum::<usize>().max(1) as f64;
     let mut done = 0;
+    let mut pace = Pace::new(BATCH);
     let mut irradiance = Vec::with_capacity(parts.len());
     for part in &parts {
         let mesh = &scene.meshes[scene.instances[part.instance].mesh];
         let mut found = Vec::with_capacity(part.faces.len());
-        for batch in part.faces.chunks(BATCH) {
+        while found.len() < part.faces.len() {
+            let batch = &part.faces[found.len()..(found.len() + pace.next()).min(part.faces.len())];
             found.par_extend(batch.par_iter().map(|face| moments(patches, part, face.triangle, &light)));
             done += batch.len();
             watch(Stage::Vertices, done as f64 / faces)?;

@@ -16,7 +16,7 @@ use twinray_render::RadianceGather;
 use twinray_scene::{PatchScene, Rgb};
 use twinray_solve::Solution;
 
-use crate::watch::{Stage, Watch};
+use crate::watch::{Pace, Stage, Watch};
 
 pub use grid::{NEIGHBOURS, ProbeError, ProbeGrid, ProbeSpacing, neighbours};
 pub use harmonics::{HARMONICS, Harmonics};
@@ -90,8 +90,9 @@ pub fn bake_probes(
         Harmonics::from_rgb(sum)
     };
     let mut radiance: Vec<Harmonics> = Vec::with_capacity(places.len());
+    let mut pace = Pace::new(BATCH);
     while radiance.len() < places.len() {
-        let batch = radiance.len()..(radiance.len() + BATCH).min(places.len());
+        let batch = radiance.len()..(radiance.len() + pace.next()).min(places.len());
         radiance.par_extend(batch.into_par_iter().map(light));
         watch(Stage::Probes, radiance.len() as f64 / places.len() as f64)?;
     }
