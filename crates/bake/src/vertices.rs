@@ -29,6 +29,9 @@ pub struct VertexLight {
     pub parts: Vec<Part>,
     /// For each part, by vertex of its mesh: irradiance, W·m⁻² (or lux); black for vertices of no face.
     pub irradiance: Vec<Vec<[f32; 3]>>,
+    /// How far interpolation over the triangles is off: RMS of its difference to the light, over the mean of the light, both of
+    /// luminance.
+    pub off: f64,
 }
 
 /// Bakes the light of `solution` into vertices.
@@ -52,6 +55,7 @@ pub fn bake_vertices(
     let mut done = 0;
     let mut pace = Pace::new(BATCH);
     let mut irradiance = Vec::with_capacity(parts.len());
+    let mut sums = Sums::default();
     for part in &parts {
         let mesh = &scene.meshes[scene.instances[part.instance].mesh];
         let mut found = Vec::with_capacity(part.faces.len());
@@ -61,9 +65,11 @@ pub fn bake_vertices(
             done += batch.len();
             watch(Stage::Vertices, done as f64 / faces)?;
         }
-        irradiance.push(fit(part, &found, &mesh.positions, mesh.normals.as_deref()));
+        let values = fit(part, &found, &mesh.positions, mesh.normals.as_deref());
+        sums.add(part, &found, &values);
+        irradiance.push(values);
     }
-    Ok(VertexLight { parts, irradiance })
+    Ok(VertexLight { parts, irradiance, off: sums.off() })
 }
 
 /// What a face adds to the sums of its corners.
@@ -71,6 +77,36 @@ struct Moments {
     area: f64,
     /// ∫ φ E over the face.
     right: [Rgb; 3],
+    /// ∫ E² over the face, of luminance.
+    square: f64,
+}
+
+/// Over all faces.
+#[derive(Default)]
+struct Sums {
+    area: f64,
+    light: f64,
+    /// ∫ (Σ φ x − E)², of luminance.
+    off: f64,
+}
+
+impl Sums {
+    fn add(&mut self, part: &Part, found: &[Moments], values: &[[f32; 3]]) {
+        for (face, moments) in part.faces.iter().zip(found) {
+            let x = face.corners.map(|k| Rgb::from_f32(values[k as usize]).luminance());
+            let right = moments.right.map(|r| r.luminance());
+            let sum: f64 = x.iter().sum();
+            let square: f64 = x.iter().map(|x| moments.area / 12.0 * x * (sum + x)).sum();
+            let both: f64 = x.iter().zip(right).map(|(x, r)| x * r).sum();
+            self.area += moments.area;
+            self.light += right.iter().sum::<f64>();
+            self.off += (moments.square - 2.0 * both + square).max(0.0);
+        }
+    }
+
+    fn off(&self) -> f64 {
+        if self.light > 0.0 { (self.off * self.area).sqrt() / self.light } else { 0.0 }
+    }
 }
 
 /// The values at the vertices of a part whose faces gave `found`.
@@ -120,7 +156,7 @@ fn fit(part: &Part, found: &[Moments], positions: &[[f32; 3]], normals: Option<&
 fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLight<'_>) -> Moments {
     let cells = f64::from(patches.cells_of(triangle).count());
     let count = (4.0 * cells).clamp(POINTS[0], POINTS[1]) as u32;
-    let (mut right, mut lit) = ([Rgb::BLACK; 3], [0.0; 3]);
+    let (mut right, mut lit, mut square) = ([Rgb::BLACK; 3], [0.0; 3], 0.0);
     for k in 0..count {
         // The plastic sequence, folded into the triangle (Roberts 2018).
         let place = |step: f64| (f64::from(k) * step + 0.5).fract();
@@ -136,13 +172,14 @@ fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLigh
             right[c] += there * weights[c];
             lit[c] += weights[c];
         }
+        square += there.luminance().powi(2);
     }
     let area = area(patches, triangle);
     // What stands on the face hides its share of every corner's light.
     let total: f64 = lit.iter().sum();
     let area = area * total / f64::from(count);
     let scale = if total > 0.0 { area / total } else { 0.0 };
-    Moments { area, right: right.map(|r| r * scale) }
+    Moments { area, right: right.map(|r| r * scale), square: square * scale }
 }
 
 /// Minimises ∫ (Σ φ x − E)² + smoothness over the vertices that are `free`, by conjugate gradients.

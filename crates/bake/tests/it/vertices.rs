@@ -1,7 +1,8 @@
 //! Light at vertices.
 
 use crate::scenes::{Boxes, cut, solve};
-use twinray_bake::{Quality, bake_vertices};
+use twinray_bake::{Quality, SurfaceLight, bake_vertices};
+use twinray_scene::Rgb;
 
 /// Values at vertices have the power of the solution, and are nowhere negative.
 #[test]
@@ -36,4 +37,39 @@ fn vertices_have_the_power_of_the_solution() {
     }
     assert!((area_of_parts / patches.total_area() - 1.0).abs() < 1e-6);
     assert!((found / truth - 1.0).abs() < 0.005, "{found} against {truth}");
+}
+
+/// What is said of the error of interpolation is what is found at points between the vertices.
+#[test]
+fn the_error_of_interpolation_is_known() {
+    let mut room = Boxes::new();
+    let (white, lamp) = (room.material(0.6, 0.0), room.material(0.0, 10.0));
+    room.add([0.0, 0.0, 0.0], [4.0, 2.5, 3.0], white, true);
+    room.add([1.5, 2.0, 1.0], [2.0, 2.1, 1.5], lamp, false);
+    let patches = cut(&room.0, 0.1);
+    let solution = solve(&patches, 2_000_000);
+    let baked = bake_vertices(&room.0, &patches, &solution, Quality::Smooth, 1, &mut |_, _| Ok(())).expect("light");
+    let light = SurfaceLight::new(&patches, &solution, Quality::Smooth, 1);
+    let [mut area, mut mean, mut off] = [0.0; 3];
+    for (part, values) in baked.parts.iter().zip(&baked.irradiance) {
+        for face in part.faces.iter().filter(|f| !f.dark) {
+            let [a, b, c] = patches.corners(face.triangle);
+            let n = 40;
+            let each = (b - a).cross(c - a).length() / f64::from(n * n);
+            for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
+                let [u, v] = [i, j].map(|k| (f64::from(k) + 1.0 / 3.0) / f64::from(n));
+                let place = part.place([1.0 - u - v, u, v]);
+                let Some(there) = light.at(face.triangle, part.side, place, 0, 0..1) else { continue };
+                let corner = face.corners.map(|k| Rgb::from_f32(values[k as usize]).luminance());
+                let interpolated = (1.0 - u - v) * corner[0] + u * corner[1] + v * corner[2];
+                area += each;
+                mean += each * there.luminance();
+                off += each * (interpolated - there.luminance()).powi(2);
+            }
+        }
+    }
+    let expected = (off / area).sqrt() / (mean / area);
+    // Large walls under a small lamp.
+    assert!(expected > 0.2, "{expected}");
+    assert!((baked.off / expected - 1.0).abs() < 0.05, "{} against {expected}", baked.off);
 }
