@@ -475,7 +475,7 @@ pub struct BakeArgs {
     #[command(flatten)]
     pub solve: SolveArgs,
     /// File to write: .glb [default: SCENE-lit.glb in this folder]; lightmaps that lie beside it take its name. With --to
-    /// probes .json, .exr, or .ktx2 as Bevy reads it [default: SCENE-probes.json]
+    /// probes .json, .exr, or .ktx2 as Bevy reads it [default: SCENE-probes.json, or what --for reads]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// What carries the light [default: lightmap]
@@ -488,23 +488,23 @@ pub struct BakeArgs {
     #[arg(long, value_name = "TEXELS_PER_METRE", value_parser = above_zero, allow_negative_numbers = true)]
     pub density: Option<f64>,
     /// Side of a page, texels, at most [default: 1024, or 2048 with --density]
-    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(64..=8192))]
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(64..=8192), allow_negative_numbers = true)]
     pub page_size: Option<u32>,
-    /// Texels around each chart that belong to no other: 2 for bilinear filters, more for mip maps
-    #[arg(long, value_name = "TEXELS", default_value = "2", value_parser = clap::value_parser!(u32).range(1..=16))]
-    pub padding: u32,
+    /// Texels around each chart that belong to no other: 2 for bilinear filters, more for mip maps [default: 2]
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(1..=16), allow_negative_numbers = true)]
+    pub padding: Option<u32>,
     /// How each texel's light is found [default: smooth]
     #[arg(long, value_enum)]
     pub quality: Option<QualityArg>,
-    /// Of --quality high: rays that each texel gathers with
-    #[arg(long, value_name = "N", default_value = "256", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    pub texel_rays: u32,
+    /// Of --quality high: rays that each texel gathers with [default: 256]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), allow_negative_numbers = true)]
+    pub texel_rays: Option<u32>,
     /// Of --to probes: how far they are apart, at most [default: a metre, less in small scenes]
     #[arg(long, value_name = "METRES", value_parser = above_zero, allow_negative_numbers = true)]
     pub spacing: Option<f64>,
-    /// Of --to probes: rays of each
-    #[arg(long, value_name = "N", default_value = "512", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    pub probe_rays: u32,
+    /// Of --to probes: rays of each [default: 512]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), allow_negative_numbers = true)]
+    pub probe_rays: Option<u32>,
     /// Lay out new texture coordinates even where the scene's second set is sound
     #[arg(long)]
     pub unwrap: bool,

@@ -1,24 +1,36 @@
 //! Ctrl-C and SIGTERM: the first asks to stop at the end of the wave and keep the result, the second stops at once.
 
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI32, Ordering};
 
-/// The signal that asked to stop; 0 for none.
+/// The signal that asks to stop; 0 for none.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
+/// The last there was.
+static LAST: AtomicI32 = AtomicI32::new(0);
 
-const SAID: &str =
-    "\nstopping at the end of this wave or pass; what there is will be written (the same again stops at once)";
-
-/// Whether nothing is at stake: ending is what a signal is for.
-static EXPECTED: AtomicBool = AtomicBool::new(false);
+/// What is said when one asks to stop.
+static SAID: Mutex<Option<&str>> = Mutex::new(Some(
+    "stopping at the end of this wave or pass; what there is will be written (the same again stops at once)",
+));
 
 /// From now on a signal is the usual end, and nothing is said of it.
 pub fn expect() {
-    EXPECTED.store(true, Ordering::SeqCst);
+    say_instead(None);
+}
+
+/// From now on this is said when a signal asks to stop.
+pub fn say_instead(words: Option<&'static str>) {
+    *SAID.lock().unwrap_or_else(|e| e.into_inner()) = words;
+}
+
+/// What a signal asked for is done, and something else begins: the next one is a first one again.
+pub fn answered() {
+    SIGNAL.store(0, Ordering::SeqCst);
 }
 
 fn say() {
-    if !EXPECTED.load(Ordering::SeqCst) {
-        crate::say!("{SAID}");
+    if let Some(words) = *SAID.lock().unwrap_or_else(|e| e.into_inner()) {
+        crate::say!("\n{words}");
     }
 }
 
@@ -31,6 +43,7 @@ pub fn install() {
     let Ok(mut signals) = signal_hook::iterator::Signals::new(wanted) else { return };
     std::thread::spawn(move || {
         for signal in signals.forever() {
+            LAST.store(signal, Ordering::SeqCst);
             if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
                 // The last checkpoint is in its place.
                 crate::output::abandon();
@@ -53,6 +66,7 @@ fn is_ignored(signal: i32) -> bool {
 #[cfg(not(unix))]
 pub fn install() {
     use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
     use signal_hook::consts::SIGINT;
@@ -64,6 +78,7 @@ pub fn install() {
         loop {
             std::thread::sleep(Duration::from_millis(50));
             if flag.swap(false, Ordering::SeqCst) {
+                LAST.store(SIGINT, Ordering::SeqCst);
                 if SIGNAL.swap(SIGINT, Ordering::SeqCst) != 0 {
                     crate::output::abandon();
                     std::process::exit(exit_code(SIGINT).into());
@@ -81,7 +96,7 @@ pub fn requested() -> bool {
 
 /// The exit code of a program that was asked to stop: 128 and the signal's number, 130 for Ctrl-C and 143 for SIGTERM.
 pub fn code() -> u8 {
-    exit_code(SIGNAL.load(Ordering::SeqCst))
+    exit_code(LAST.load(Ordering::SeqCst))
 }
 
 fn exit_code(signal: i32) -> u8 {

@@ -202,7 +202,8 @@ impl FrameProgress {
         let share = (self.done as f64 + share_of_next.clamp(0.0, 1.0)) / self.total as f64;
         let left = seconds * (1.0 / share.max(1e-9) - 1.0);
         let left = HumanDuration(Duration::from_secs_f64(left.min(1e9)));
-        self.shown.tell(share, format!("{} {} of {}  {left} left", self.what, self.done + 1, self.total));
+        let which = if self.total > 1 { format!(" {} of {}", self.done + 1, self.total) } else { String::new() };
+        self.shown.tell(share, format!("{}{which}  {left} left", self.what));
         self.last_line = seconds;
     }
 

@@ -62,7 +62,10 @@ pub struct ProbeGrid {
 
 impl ProbeGrid {
     /// A grid over all that rays can meet.
-    pub(crate) fn new(patches: &PatchScene, spacing: ProbeSpacing) -> Result<Self, ProbeError> {
+    ///
+    /// # Errors
+    /// If the spacing is no length, or asks for too many probes.
+    pub fn new(patches: &PatchScene, spacing: ProbeSpacing) -> Result<Self, ProbeError> {
         let corners = (0..patches.triangle_count() as u32).flat_map(|t| patches.corners(t));
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (low, high) = corners.fold(none, |(low, high), p| (low.min(p), high.max(p)));

@@ -141,6 +141,35 @@ fn probes_are_written_as_asked() {
     }
 }
 
+/// Probes for Bevy have the name that it reads.
+#[test]
+fn probes_are_named_for_their_engine() {
+    let place = Place::new();
+    let args = ["bake", "doorway", "--to", "probes", "--for", "bevy", "--spacing", "2", "--probe-rays", "4"];
+    place.done(&[&args[..], &TINY[..]].concat());
+    assert_eq!(place.files(), ["doorway-probes.ktx2"]);
+}
+
+/// Pages that a larger bake left are told, and stay; light that is hardly known is told too.
+#[test]
+fn what_one_should_know_is_said() {
+    let place = Place::new();
+    let args = ["bake", "cornell", "-o", "lit.glb", "--for", "bevy", "--page-size", "64", "--json"];
+    let pages = |density: &str| place.done(&[&args[..], &TINY[..], &["--density", density]].concat()).json();
+    let many = pages("100")["files"].as_array().unwrap().len();
+    assert!(many > 2, "{many}");
+    let report = pages("20");
+    let few = report["files"].as_array().unwrap().len();
+    assert!(few < many - 1);
+    let said = report["warnings"].to_string();
+    assert!(said.contains(&format!("lit-{few}.ktx2 to lit-{}.ktx2", many - 1)), "{said}");
+    assert_eq!(place.files().len(), many + 1);
+
+    let report = place.done(&["bake", "hall", "-o", "hall.glb", "--to", "vertex", "--rays", "2k", "--json"]).json();
+    assert!(report["warnings"].to_string().contains("is known to"), "{report:#}");
+    assert!(report["bake"]["layout"]["off"].as_f64().unwrap() > 0.01, "{report:#}");
+}
+
 /// Lights that are baked leave the file unless they are to stay.
 #[test]
 fn baked_lights_leave() {
@@ -191,6 +220,13 @@ fn what_makes_no_sense_is_refused() {
         (&["bake", "cornell", "-o", "lit.glb", "--for", "unlit", "--exposure", "nan"], "stops"),
         (&["bake", "cornell", "-o", "lit.glb", "--to", "vertex", "--unwrap"], "is for lightmaps"),
         (&["bake", "cornell", "-o", "lit.glb", "--spacing", "1"], "is for probes"),
+        (&["bake", "cornell", "-o", "lit.glb", "--probe-rays", "9"], "is for probes"),
+        (&["bake", "cornell", "-o", "lit.glb", "--texel-rays", "9"], "is for --quality high"),
+        (&["bake", "cornell", "--to", "probes", "--quality", "high"], "for light on surfaces"),
+        (&["bake", "cornell", "--to", "probes", "--for", "unlit"], "leave one"),
+        (&["bake", "cornell", "--to", "probes", "--for", "bevy", "-o", "p.exr"], ".ktx2"),
+        (&["bake", "cornell", "--to", "probes", "--spacing", "1e-9", "--rays", "1e12"], "too many"),
+        (&["bake", "cornell", "--page-size", "-1"], "is not in 64..=8192"),
         (&["bake", "cornell", "--density", "0"], "a positive number"),
         (&["bake", "cornell", "--exposure", "1"], "--for unlit"),
         (&["bake", "cornell", "--to", "vertex", "--for", "unlit"], "leave one"),

@@ -40,6 +40,41 @@ fn ctrl_c_writes_the_reference() {
     assert!(kept.provenance.rays >= kept.light.len() as u64);
 }
 
+/// Light that was solved is not lost when its bake is stopped, and the bake of what is kept is the one that was stopped.
+#[test]
+fn ctrl_c_keeps_the_light_of_a_bake() {
+    let place = Place::new();
+    let solve = ["--patches", "2000", "--rays", "200000"];
+    let bake = ["-o", "lit.glb", "--page-size", "256"];
+    let slow = ["--quality", "high", "--texel-rays", "4096"];
+    // Light of another bake is not replaced.
+    place.write("lit.twin", "light of another bake");
+    for (scene, args, files) in [
+        ("cornell", [&bake[..], &solve, &slow].concat(), ["lit-2.twin", "lit.twin"]),
+        ("lit-2.twin", [&bake[..], &slow].concat(), ["lit-2.twin", "lit.twin"]),
+    ] {
+        let mut child = Command::new(assert_cmd::cargo::cargo_bin!("twinray"))
+            .args([&["bake", scene], &args[..]].concat())
+            .current_dir(place.path(""))
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+        assert!(lines.any(|line| line.contains("baking")), "no progress");
+        send(child.id(), "-INT");
+        let said = lines.collect::<Vec<_>>().join("\n");
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
+        assert!(said.contains("stopping") && said.contains("light"), "{said}");
+        let mut found = place.files();
+        found.sort();
+        assert_eq!(found, files, "{said}");
+    }
+    place.done(&[&["bake", "lit-2.twin"], &bake[..]].concat());
+    let kept = place.read("lit.glb");
+    place.done(&[&["bake", "cornell"], &bake[..], &solve].concat());
+    assert!(place.read("lit.glb") == kept);
+}
+
 /// Finished frames stay, none is half, and the message says how to go on.
 #[test]
 fn ctrl_c_leaves_whole_frames() {

@@ -53,6 +53,26 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
     dressed
 }
 
+/// Says which pages of an earlier and larger bake lie beside those that were written.
+pub fn left_over(files: &[(PathBuf, Vec<u8>)]) -> Option<String> {
+    let (last, _) = files.last()?;
+    let name = last.file_stem()?.to_string_lossy().into_owned();
+    let (stem, number) = name.rsplit_once('-')?;
+    let number: usize = number.parse().ok()?;
+    let kind = last.extension()?.to_string_lossy().into_owned();
+    let later = |k: usize| last.with_file_name(format!("{stem}-{k}.{kind}"));
+    let count = (number + 1..).take_while(|&k| later(k).is_file()).count();
+    let first = later(number + 1).display().to_string();
+    match count {
+        0 => None,
+        1 => Some(format!("{first}: is of an earlier bake; nothing refers to it any more")),
+        _ => Some(format!(
+            "{first} to {}: are of an earlier bake; nothing refers to them any more",
+            later(number + count).display()
+        )),
+    }
+}
+
 fn in_the_file(page: &Page, name: &str) -> LitMaterial {
     // A sunny day has more lux than shared exponents can say.
     let largest = page.irradiance.iter().flatten().copied().fold(0.0, f32::max);

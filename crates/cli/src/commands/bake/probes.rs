@@ -8,15 +8,26 @@ use twinray::bake::{ProbeError, ProbeOptions, ProbeSpacing, Watch, bake_probes};
 use twinray::format::{ProbeArrays, ProbeLattice, write_bevy_volume, write_probes_exr, write_probes_json};
 use twinray::solve::Solution;
 
-use crate::args::BakeArgs;
+use crate::args::{BakeArgs, EngineArg};
 use crate::input::Loaded;
 use crate::output::extension;
 
 const GENERATOR: &str = concat!("twinray ", env!("CARGO_PKG_VERSION"));
+/// Rays of each where the user does not say.
+const RAYS: u32 = 512;
 
 /// True if a file of this name can hold probes.
 pub fn can_be(path: &Path) -> bool {
     matches!(extension(path).as_str(), "json" | "exr" | "ktx2")
+}
+
+/// How the name of a file ends that an engine reads.
+pub fn kind_for(engine: Option<EngineArg>) -> &'static str {
+    match engine {
+        Some(EngineArg::Bevy) => "ktx2",
+        Some(EngineArg::Godot) => "exr",
+        Some(EngineArg::Three | EngineArg::Unlit) | None => "json",
+    }
 }
 
 /// The file's bytes, facts about them, and a line.
@@ -30,12 +41,12 @@ pub fn bake(
     let name = &args.load.scene;
     let options = ProbeOptions {
         spacing: args.spacing.map_or(ProbeSpacing::Default, ProbeSpacing::Metres),
-        rays: args.probe_rays,
+        rays: args.probe_rays.unwrap_or(RAYS),
         punctual: !args.keep_lights,
         seed: args.solve.seed.unwrap_or(1),
     };
     let volume = bake_probes(&loaded.patches, solution, &options, watch).map_err(|e| match e {
-        ProbeError::Cancelled(_) => super::stopped(name),
+        ProbeError::Cancelled(stopped) => anyhow::Error::new(stopped),
         other => anyhow!("{name}: {other}"),
     })?;
     let lattice = ProbeLattice { low: volume.grid.low, cell: volume.grid.cell, counts: volume.grid.counts };
