@@ -1,5 +1,5 @@
 /**
- * Lightmaps of `twinray bake` for the GLTFLoader of three.js:
+ * Lightmaps, and light at vertices, of `twinray bake` for the GLTFLoader of three.js:
  *
  *     import { TwinrayLightmap } from "./twinray-lightmap.js";
  *     const loader = new GLTFLoader().register((parser) => new TwinrayLightmap(parser));
@@ -7,6 +7,8 @@
  * Materials get a `lightMap` of irradiance in the units of the scene (lux where radiance is in nit), as three.js takes it.
  * Show it with `renderer.toneMappingExposure`, which a scene of a few hundred lux wants near 0.01. The picture is KTX2, RGB9E5
  * packed by zlib, which browsers unpack themselves: nothing else has to be installed.
+ *
+ * Meshes with light at their vertices (`--to vertex`) get materials that add it as a lightmap would be added.
  */
 
 import { ClampToEdgeWrapping, DataTexture, LinearFilter, NoColorSpace, RGBFormat, UnsignedInt5999Type } from "three";
@@ -15,6 +17,8 @@ const NAME = "TWINRAY_lightmap";
 /** VK_FORMAT_E5B9G9R9_UFLOAT_PACK32. */
 const RGB9E5 = 123;
 const [PLAIN, ZLIB] = [0, 3];
+/** What GLTFLoader makes of `_IRRADIANCE`. */
+const IRRADIANCE = "_irradiance";
 
 export class TwinrayLightmap {
     /** @param {import("three/addons/loaders/GLTFLoader.js").GLTFParser} parser */
@@ -45,6 +49,33 @@ export class TwinrayLightmap {
     }
 
     /**
+     * Called by the loader at the end.
+     * @param {import("three/addons/loaders/GLTFLoader.js").GLTF} gltf
+     */
+    async afterRoot(gltf) {
+        /** @type {Map<import("three").Material, import("three").Material>} */
+        const lit = new Map();
+        const litOf = (/** @type {import("three").Material} */ material, /** @type {boolean} */ hasColours) => {
+            let found = lit.get(material);
+            if (!found) lit.set(material, (found = withVertexLight(material, hasColours)));
+            return found;
+        };
+        for (const scene of gltf.scenes) {
+            scene.traverse((object) => {
+                const mesh = /** @type {import("three").Mesh} */ (object);
+                if (!mesh.isMesh || !mesh.geometry.attributes[IRRADIANCE]) return;
+                // The light is in COLOR_0 too, for viewers that know nothing of it; the author's colours have moved.
+                const colours = mesh.geometry.attributes.color_1;
+                mesh.geometry.deleteAttribute("color");
+                if (colours) mesh.geometry.setAttribute("color", colours);
+                mesh.material = Array.isArray(mesh.material)
+                    ? mesh.material.map((material) => litOf(material, Boolean(colours)))
+                    : litOf(mesh.material, Boolean(colours));
+            });
+        }
+    }
+
+    /**
      * @param {number} image
      * @param {number} channel
      */
@@ -62,6 +93,29 @@ export class TwinrayLightmap {
         texture.needsUpdate = true;
         return texture;
     }
+}
+
+/**
+ * A copy of a material that adds irradiance at vertices to that of lights.
+ * @param {import("three").Material} material
+ * @param {boolean} hasColours
+ */
+function withVertexLight(material, hasColours) {
+    const lit = material.clone();
+    lit.vertexColors = hasColours;
+    lit.onBeforeCompile = (shader) => {
+        const declared = "varying vec3 vTwinrayIrradiance;\n";
+        shader.vertexShader = `attribute vec3 ${IRRADIANCE};\n${declared}${shader.vertexShader}`.replace(
+            "#include <begin_vertex>",
+            `#include <begin_vertex>\nvTwinrayIrradiance = ${IRRADIANCE};`,
+        );
+        shader.fragmentShader = `${declared}${shader.fragmentShader}`.replace(
+            "#include <lights_fragment_maps>",
+            "#include <lights_fragment_maps>\n#ifdef RE_IndirectDiffuse\nirradiance += vTwinrayIrradiance;\n#endif",
+        );
+    };
+    lit.customProgramCacheKey = () => "twinray vertex light";
+    return lit;
 }
 
 /**

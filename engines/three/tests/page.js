@@ -71,6 +71,7 @@ async function compare(file, picture) {
         // Half of the squares are nearer than this to twinray's, nine of ten than that; what is beyond are edges.
         ...deviations(ratios),
         lightmaps: [...materials(gltf.scene)].filter((m) => m.lightMap).length,
+        coloured: [...materials(gltf.scene)].filter((m) => m.vertexColors).length,
         lights: [...lights(gltf.scene)].length,
     };
 }

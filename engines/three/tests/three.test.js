@@ -2,13 +2,15 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { createReadStream, existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { createReadStream, existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join, normalize } from "node:path";
 import { after, before, test } from "node:test";
 
 import puppeteer from "puppeteer-core";
+
+import { COLOUR, roomFile } from "./room.js";
 
 const HERE = new URL("..", import.meta.url).pathname;
 const TWINRAY = process.env.TWINRAY ?? "twinray";
@@ -59,9 +61,14 @@ after(async () => {
 const twinray = (...args) =>
     execFileSync(TWINRAY, args, { cwd: folder, encoding: "utf8", stdio: ["ignore", "pipe", "inherit"] });
 
-/** Bakes a scene, takes its picture, and compares. @param {string} name @param {string[]} how */
-async function compared(name, how) {
-    twinray("solve", name, "--rays", "20M", "-o", `${name}.twin`, "-q");
+/**
+ * Bakes a scene, takes its picture, and compares.
+ * @param {string} name
+ * @param {string[]} how
+ * @param {{ scene?: string, rays?: string }} [what]
+ */
+async function compared(name, how, { scene = name, rays = "20M" } = {}) {
+    twinray("solve", scene, "--rays", rays, "-o", `${name}.twin`, "-q");
     const report = JSON.parse(twinray("bake", `${name}.twin`, "-o", `${name}.glb`, "-q", "--json", ...how));
     twinray(
         "render",
@@ -105,6 +112,29 @@ for (const [name, how, p50] of /** @type {[string, string[], number][]} */ ([
         assert.ok(found.p50 < p50, `half of the squares within ${found.p50}`);
         assert.equal(found.lights, 0);
         assert.ok(report.bake.layout.seams.p99 < 0.02, `seams jump by ${report.bake.layout.seams.p99}`);
+    });
+}
+
+for (const colours of [false, true]) {
+    const over = colours ? "over" : "without";
+    test(`light at vertices looks as twinray shows it, ${over} the author's colours`, async () => {
+        const name = colours ? "painted" : "room";
+        writeFileSync(join(folder, `${name}.gltf`), roomFile(40, colours));
+        const { report, found, complaints } = await compared(name, ["--to", "vertex"], {
+            scene: `${name}.gltf`,
+            rays: "6M",
+        });
+        console.log(name, found, report.bake.layout);
+        assert.deepEqual(complaints, []);
+        assert.equal(report.bake.layout.carrier, "vertex");
+        assert.equal(found.lightmaps, 0);
+        assert.equal(found.coloured > 0, colours);
+        // twinray takes no colours of vertices, which three.js multiplies what it shows by.
+        const [red, green, blue] = colours ? COLOUR : [1, 1, 1];
+        const expected = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+        assert.ok(Math.abs(found.ratio / expected - 1) < 0.02, `ratio of means ${found.ratio}`);
+        assert.ok(Math.abs(found.median / expected - 1) < 0.02, `median ratio ${found.median}`);
+        if (!colours) assert.ok(found.p50 < 0.03, `half of the squares within ${found.p50}`);
     });
 }
 
