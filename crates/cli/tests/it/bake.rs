@@ -79,6 +79,9 @@ fn a_lit_scene_keeps_its_page() {
         .json();
     assert_eq!(report["bake"]["layout"]["texcoords"], "authored", "{report:#}");
     assert_eq!(triangles(&reading(&place, "lit.glb")), triangles(&reading(&place, "again.glb")));
+    // The old page is gone from it.
+    let images = |name: &str| document(&place, name)["images"].as_array().unwrap().len();
+    assert_eq!(images("again.glb"), images("lit.glb"));
 }
 
 /// Every engine and carrier gives its kind of file.

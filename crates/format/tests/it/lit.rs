@@ -598,6 +598,55 @@ fn light_at_vertices_is_exact_beside_its_colours() {
     assert_eq!(primitive["material"], json!(0));
 }
 
+/// Baked again, a document has the new light alone: it is what it was, however often.
+#[test]
+fn light_of_an_earlier_bake_leaves() {
+    let doc = adorned();
+    let bake = |source: &[u8], at_vertices: bool| {
+        let reading = support::read("again.glb", source).unwrap();
+        let mut lit = everything(&reading.scene);
+        lit.about = json!({ "rays": 1 });
+        for surface in &mut lit.surfaces {
+            let mesh = &reading.scene.meshes[reading.scene.instances[surface.instance].mesh];
+            let vertex = |source: u32| LitVertex {
+                source,
+                texcoord: (!at_vertices).then(|| place(source)),
+                irradiance: at_vertices.then_some([1.0, 0.5, source as f32]),
+            };
+            surface.vertices = (0..mesh.positions.len() as u32).map(vertex).collect();
+            surface.triangles = mesh.triangles.clone();
+            surface.page = (!at_vertices).then_some(0);
+        }
+        if at_vertices {
+            lit.pages.clear();
+        }
+        write("again.glb", source, &[], &reading.origins, &lit).bytes
+    };
+    let [lightmap, vertices] = [false, true].map(|at_vertices| bake(&doc.glb(), at_vertices));
+    // Of the first bake, both sets of coordinates are one.
+    let again = bake(&lightmap, false);
+    assert!(bake(&again, false) == again);
+    let count = |bytes: &[u8]| Glb::new(bytes).json["images"].as_array().unwrap().len();
+    assert_eq!(count(&again), count(&lightmap));
+    for key in ["textures", "samplers", "materials", "extensionsUsed"] {
+        assert_eq!(Glb::new(&again).json[key], Glb::new(&lightmap).json[key], "{key}");
+    }
+    assert!(bake(&vertices, true) == vertices);
+    let changed = Glb::new(&bake(&lightmap, true)).json;
+    let text = changed.to_string();
+    assert!(!text.contains("lightmap") && text.contains("_IRRADIANCE"), "{text}");
+    assert!(changed["images"].is_null() && changed["textures"].is_null(), "{text}");
+    // Colours of the author are the first again; the coordinates of the charts stay.
+    let back = Glb::new(&bake(&vertices, false)).json;
+    let attributes = &back["meshes"][0]["primitives"][0]["attributes"];
+    assert!(attributes["COLOR_0"].is_u64() && attributes["COLOR_1"].is_null() && attributes["_IRRADIANCE"].is_null());
+    // A document that nobody has baked keeps what looks like it.
+    let mut foreign = doc.json.clone();
+    foreign["images"] = json!([{ "uri": "data:image/png;base64,AAAA" }]);
+    let foreign = Doc { json: foreign, ..doc };
+    assert!(Glb::new(&bake(&foreign.glb(), true)).json["images"].is_array());
+}
+
 #[test]
 fn pages_beside_the_file_and_colours_without_light() {
     let mut doc = Doc::square();

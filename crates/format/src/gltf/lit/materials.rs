@@ -199,7 +199,7 @@ fn put(owner: &mut Value, group: &str, key: &str, value: Value) {
 }
 
 /// Calls `each` with the number of a primitive's material, then with those of its variants (`KHR_materials_variants`).
-fn walk_materials(primitive: &mut Value, each: &mut dyn FnMut(&mut Option<Value>)) {
+pub(super) fn walk_materials(primitive: &mut Value, each: &mut dyn FnMut(&mut Option<Value>)) {
     fn visit(owner: &mut Value, each: &mut dyn FnMut(&mut Option<Value>)) {
         let Some(owner) = owner.as_object_mut() else { return };
         let mut material = owner.remove("material");

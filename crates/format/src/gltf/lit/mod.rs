@@ -1,9 +1,10 @@
 //! Baked light put into the document that it was baked for. Everything else of the document stays as it is: nodes,
 //! names, animations, materials, extensions that nobody here knows.
 //!
-//! `geometry` makes primitives with new texture coordinates, `materials` those that show the light, `tidy` puts all binary data into one
+//! `former` takes out what an earlier bake left, `geometry` makes primitives with new texture coordinates, `materials` those that show the light, `tidy` puts all binary data into one
 //! chunk and leaves out what nothing refers to any more, by the `references` that there are.
 
+mod former;
 mod geometry;
 mod materials;
 mod references;
@@ -120,7 +121,7 @@ pub struct LitGlb {
 /// A primitive that has surfaces is replaced by them: attributes of any kind, morph targets among them, are copied vertex by
 /// vertex; `TEXCOORD_1` becomes the lightmap's, and where the material uses the old one, that is kept under the next free number,
 /// as is `COLOR_0` where vertices carry irradiance. Nodes that shared a mesh get meshes of their own. Materials and pictures that
-/// nothing shows any more stay; geometry goes. Equal arguments give equal bytes.
+/// nothing shows any more stay, but for those of an earlier bake; geometry goes. Equal arguments give equal bytes.
 ///
 /// # Errors
 /// As [`crate::read_scene`], and [`FormatError::Unsupported`] beyond the 4 GiB that such a file can hold. A surface whose
@@ -141,7 +142,8 @@ pub fn write_lit_glb(
     context.check_size(source.len(), name)?;
     context.budget.add_input(source.len());
     let (text, chunk) = container::split(name, source)?;
-    let (original, _) = json::parse(&mut context, text)?;
+    let (mut original, _) = json::parse(&mut context, text)?;
+    former::forget(&mut original);
     let root = Element::root(name, &original);
     if !root.is_object() {
         return Err(FormatError::invalid(name, "JSON", "no object", "a glTF 2.0 document"));
