@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use twinray::format::{self, Limits, PictureFile, SceneSource};
-use twinray::scene::complete::{choose_camera, complete};
+use twinray::scene::complete::{Addition, choose_camera, complete};
 use twinray::scene::{Camera, CameraAnimation, PatchBudget, PatchOptions, PatchScene, Projection, Scene, builtin};
 
 use crate::args::{LoadArgs, ReadArgs, ViewArgs};
@@ -28,8 +28,10 @@ pub struct Loaded {
     pub patches: PatchScene,
     /// Cameras of the file; before them, the one that was chosen.
     pub cameras: Vec<Camera>,
-    /// Whether the first of them is not the file's.
+    /// Whether the first of them is what options describe.
     is_chosen: bool,
+    /// What the file lacked.
+    pub additions: Vec<Addition>,
     /// How cameras of the file move.
     pub animations: Vec<CameraAnimation>,
     /// What was ignored or added, one line each.
@@ -49,7 +51,8 @@ pub struct Loaded {
 impl Loaded {
     /// Cameras of the file alone.
     pub fn scene_cameras(&self) -> &[Camera] {
-        &self.cameras[usize::from(self.is_chosen)..]
+        let others = usize::from(self.is_chosen) + usize::from(self.additions.contains(&Addition::Camera));
+        &self.cameras[others..]
     }
 
     /// The camera that options describe, if they do; otherwise the file's of that name or index, or its first.
@@ -255,9 +258,10 @@ fn cut(
     }
     warnings.extend(estimate::announce(args, &expected, work));
     let lamp_at = wanted.as_ref().filter(|_| known.is_none());
-    for addition in complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))? {
-        warnings.push(format!("{name}: {addition}"));
-    }
+    let additions = complete(&mut scene, lamp_at, source.two_sided).map_err(|e| anyhow!("{name}: {e}"))?;
+    // Whoever wants the scene itself wants no picture.
+    let told = additions.iter().filter(|&&a| a != Addition::Camera || !work.keeps_scene);
+    warnings.extend(told.map(|addition| format!("{name}: {addition}")));
     let patches = PatchScene::new(&scene, options).map_err(|e| anyhow!("{name}: {e}"))?;
     if patches.degenerate_triangles() > 0 {
         let count = patches.degenerate_triangles();
@@ -273,6 +277,7 @@ fn cut(
         patches,
         cameras,
         is_chosen,
+        additions,
         animations,
         warnings,
         expected,

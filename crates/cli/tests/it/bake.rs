@@ -206,6 +206,22 @@ fn baked_lights_leave() {
     assert_eq!(document(&place, "lit.glb")["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"], 0);
 }
 
+/// What pictures would need is not put into a scene; one without light is not baked.
+#[test]
+fn nothing_is_invented() {
+    let place = Place::new();
+    let corners = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n";
+    place.write("floor.obj", format!("{corners}f 1 5 6 2\n"));
+    place.write("closed.obj", format!("{corners}f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 5 1 4 8\n"));
+    let report = place.done(&[&["bake", "floor.obj", "-o", "lit.glb", "--json"], &TINY[..]].concat()).json();
+    let warnings = report["warnings"].to_string();
+    assert!(warnings.contains("uniform sky") && !warnings.contains("camera"), "{warnings}");
+    assert!(document(&place, "lit.glb")["cameras"].is_null());
+    let run = place.run(&[&["bake", "closed.obj", "-o", "dark.glb"], &TINY[..]].concat());
+    assert_eq!(run.code, Some(2));
+    assert!(run.stderr.contains("closed.obj: has no light"), "{}", run.stderr);
+}
+
 #[test]
 fn threads_change_no_byte() {
     let args = ["--quality", "high", "--texel-rays", "4", "--page-size", "128"];

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, bail};
 use twinray::bake::{ProbeGrid, ProbeSpacing};
 use twinray::scene::Scene;
+use twinray::scene::complete::Addition;
 
 use super::{document, probes};
 use crate::args::{BakeArgs, CarrierArg, EngineArg, LoadArgs, QualityArg};
@@ -86,6 +87,9 @@ pub fn check_scene(args: &BakeArgs, loaded: &Loaded, path: &Path) -> anyhow::Res
         bail!(
             "{file}: was baked already, and the lights that were are no longer in it: bake the scene that it was made from, or that with --keep-lights"
         );
+    }
+    if loaded.additions.contains(&Addition::Lamp) {
+        bail!("{file}: has no light, and none from outside can enter: expected lamps, or materials that emit");
     }
     if args.to == Some(CarrierArg::Probes) {
         let spacing = args.spacing.map_or(ProbeSpacing::Default, ProbeSpacing::Metres);
