@@ -10,6 +10,9 @@ use crate::page::Page;
 use crate::texels::fill;
 use crate::watch::{Cancelled, Watch};
 
+/// What a texel takes is worth about so many rays.
+const RAYS: usize = 4;
+
 /// A page as it looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colours {
@@ -40,12 +43,12 @@ pub fn colours(
         let irradiance = pages[point.page as usize].sample(point.uv[0], point.uv[1]);
         Some(surface.emission + surface.scatter.brdf.base_reflectance(1.0) * irradiance / PI)
     };
-    let (mut seen, charted) = fill(atlas, parts, &radiance, watch)?;
+    let (mut seen, charted) = fill(atlas, parts, &radiance, RAYS, watch)?;
     let is_there = |point: &crate::PagePoint| {
         let [u, v] = point.place;
         Some(Rgb::grey(if patches.is_present(point.triangle, u, v) { 1.0 } else { 0.0 }))
     };
-    let (mut there, _) = fill(atlas, parts, &is_there, watch)?;
+    let (mut there, _) = fill(atlas, parts, &is_there, RAYS, watch)?;
     for ((page, charted), there) in seen.iter_mut().zip(&charted).zip(&mut there) {
         dilate(page, charted, padding + 1);
         dilate(there, charted, padding + 1);

@@ -11,6 +11,9 @@ use crate::texels::PagePoint;
 /// A surface closer than this share of a cell's side covers a point.
 const TOUCHING: f64 = 0.02;
 
+/// Reconstruction at a point takes as long as about so many rays, neighbours that are looked for among them.
+const SMOOTH: usize = 30;
+
 /// Whence the light of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
@@ -49,6 +52,15 @@ impl<'a> SurfaceLight<'a> {
     /// Rays that one piece of surface is to have in all.
     pub fn rays(&self) -> u32 {
         if let Source::Gathered(_, rays) = self.source { rays } else { 1 }
+    }
+
+    /// About as many rays as what is done for one piece of surface takes the time of.
+    pub(crate) fn cost(&self) -> usize {
+        match self.source {
+            Source::Cells(_) => 2,
+            Source::Smooth(_) => SMOOTH,
+            Source::Gathered(_, rays) => rays as usize,
+        }
     }
 
     /// Irradiance, W·m⁻² (or lux), on one side of a triangle at barycentric (`u`, `v`): `None` where the side absorbs, or

@@ -55,7 +55,7 @@ pub fn bake(
     let parts = parts::parts(scene, patches, solution);
     let atlas = Atlas::new(scene, patches, &parts, &options.atlas)?;
     let light = SurfaceLight::new(patches, solution, options.quality, options.seed);
-    let (mut pages, charted) = texels::fill(&atlas, &parts, &|point| light.at_point(point), watch)?;
+    let (mut pages, charted) = texels::fill(&atlas, &parts, &|point| light.at_point(point), light.cost(), watch)?;
     watch(Stage::Seams, 0.0)?;
     for (page, charted) in pages.iter_mut().zip(&charted) {
         dilate(page, charted, options.atlas.padding + 1);

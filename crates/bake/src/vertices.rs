@@ -10,7 +10,7 @@ use twinray_solve::Solution;
 use crate::atlas::{AtlasError, area};
 use crate::light::{Quality, SurfaceLight};
 use crate::parts::{Part, parts};
-use crate::watch::{Pace, Stage, Watch};
+use crate::watch::{Stage, Watch, pace};
 
 /// Weight of the smoothness of neighbours beside the light itself.
 const SMOOTH: f64 = 0.02;
@@ -53,14 +53,12 @@ pub fn bake_vertices(
     let light = SurfaceLight::new(patches, solution, quality, seed);
     let faces = parts.iter().map(|p| p.faces.len()).sum::<usize>().max(1) as f64;
     let mut done = 0;
-    let mut pace = Pace::new(BATCH);
     let mut irradiance = Vec::with_capacity(parts.len());
     let mut sums = Sums::default();
     for part in &parts {
         let mesh = &scene.meshes[scene.instances[part.instance].mesh];
         let mut found = Vec::with_capacity(part.faces.len());
-        while found.len() < part.faces.len() {
-            let batch = &part.faces[found.len()..(found.len() + pace.next()).min(part.faces.len())];
+        for batch in part.faces.chunks(pace(light.cost() * POINTS[0] as usize, BATCH)) {
             found.par_extend(batch.par_iter().map(|face| moments(patches, part, face.triangle, &light)));
             done += batch.len();
             watch(Stage::Vertices, done as f64 / faces)?;

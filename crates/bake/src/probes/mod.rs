@@ -16,13 +16,13 @@ use twinray_render::RadianceGather;
 use twinray_scene::{PatchScene, Rgb};
 use twinray_solve::Solution;
 
-use crate::watch::{Pace, Stage, Watch};
+use crate::watch::{Stage, Watch, pace};
 
 pub use grid::{NEIGHBOURS, ProbeError, ProbeGrid, ProbeSpacing, neighbours};
 pub use harmonics::{HARMONICS, Harmonics};
 use place::Place;
 
-/// Probes between two looks at who may want to stop.
+/// Probes between two looks at who may want to stop, at most.
 const BATCH: usize = 256;
 
 /// Settings of [`bake_probes`].
@@ -90,9 +90,9 @@ pub fn bake_probes(
         Harmonics::from_rgb(sum)
     };
     let mut radiance: Vec<Harmonics> = Vec::with_capacity(places.len());
-    let mut pace = Pace::new(BATCH);
+    let size = pace(options.rays as usize, BATCH);
     while radiance.len() < places.len() {
-        let batch = radiance.len()..(radiance.len() + pace.next()).min(places.len());
+        let batch = radiance.len()..(radiance.len() + size).min(places.len());
         radiance.par_extend(batch.into_par_iter().map(light));
         watch(Stage::Probes, radiance.len() as f64 / places.len() as f64)?;
     }
