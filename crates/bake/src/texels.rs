@@ -92,7 +92,8 @@ pub fn fill(
     for (page, sums) in pages.iter_mut().zip(&sums) {
         for ((irradiance, coverage), &[r, g, b, area]) in page.irradiance.iter_mut().zip(&mut page.coverage).zip(sums) {
             if area > 0.0 {
-                *irradiance = [r, g, b].map(|s| (s / area) as f32);
+                // Estimates may be below 0, light is not.
+                *irradiance = [r, g, b].map(|s| (s / area).max(0.0) as f32);
                 *coverage = area.min(1.0) as f32;
             }
         }

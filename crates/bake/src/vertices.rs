@@ -29,8 +29,8 @@ pub struct VertexLight {
     pub parts: Vec<Part>,
     /// For each part, by vertex of its mesh: irradiance, W·m⁻² (or lux); black for vertices of no face.
     pub irradiance: Vec<Vec<[f32; 3]>>,
-    /// How far interpolation over the triangles is off: RMS of its difference to the light, over the mean of the light, both of
-    /// luminance.
+    /// How far interpolation over the triangles is off: RMS of its difference to the light, the noise of that included, over the
+    /// mean of the light, both of luminance.
     pub off: f64,
 }
 
@@ -77,6 +77,8 @@ struct Moments {
     right: [Rgb; 3],
     /// ∫ E² over the face, of luminance.
     square: f64,
+    /// ∫ φ φ of corners 0 0, 1 1, 2 2, 0 1, 1 2, 2 0 over the face, from the same points: what is off is a small difference.
+    products: [f64; 6],
 }
 
 /// Over all faces.
@@ -93,8 +95,9 @@ impl Sums {
         for (face, moments) in part.faces.iter().zip(found) {
             let x = face.corners.map(|k| Rgb::from_f32(values[k as usize]).luminance());
             let right = moments.right.map(|r| r.luminance());
-            let sum: f64 = x.iter().sum();
-            let square: f64 = x.iter().map(|x| moments.area / 12.0 * x * (sum + x)).sum();
+            let square: f64 = (0..3)
+                .map(|k| moments.products[k] * x[k] * x[k] + 2.0 * moments.products[3 + k] * x[k] * x[(k + 1) % 3])
+                .sum();
             let both: f64 = x.iter().zip(right).map(|(x, r)| x * r).sum();
             self.area += moments.area;
             self.light += right.iter().sum::<f64>();
@@ -154,7 +157,7 @@ fn fit(part: &Part, found: &[Moments], positions: &[[f32; 3]], normals: Option<&
 fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLight<'_>) -> Moments {
     let cells = f64::from(patches.cells_of(triangle).count());
     let count = (4.0 * cells).clamp(POINTS[0], POINTS[1]) as u32;
-    let (mut right, mut lit, mut square) = ([Rgb::BLACK; 3], [0.0; 3], 0.0);
+    let (mut right, mut lit, mut square, mut products) = ([Rgb::BLACK; 3], [0.0; 3], 0.0, [0.0; 6]);
     for k in 0..count {
         // The plastic sequence, folded into the triangle (Roberts 2018).
         let place = |step: f64| (f64::from(k) * step + 0.5).fract();
@@ -169,6 +172,8 @@ fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLigh
         for c in 0..3 {
             right[c] += there * weights[c];
             lit[c] += weights[c];
+            products[c] += weights[c] * weights[c];
+            products[3 + c] += weights[c] * weights[(c + 1) % 3];
         }
         square += there.luminance().powi(2);
     }
@@ -177,7 +182,7 @@ fn moments(patches: &PatchScene, part: &Part, triangle: u32, light: &SurfaceLigh
     let total: f64 = lit.iter().sum();
     let area = area * total / f64::from(count);
     let scale = if total > 0.0 { area / total } else { 0.0 };
-    Moments { area, right: right.map(|r| r * scale), square: square * scale }
+    Moments { area, right: right.map(|r| r * scale), square: square * scale, products: products.map(|p| p * scale) }
 }
 
 /// Minimises ∫ (Σ φ x − E)² + smoothness over the vertices that are `free`, by conjugate gradients.

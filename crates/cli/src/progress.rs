@@ -7,6 +7,8 @@ use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressStyle};
 
 /// Seconds between plain lines.
 const LINE_INTERVAL: f64 = 2.0;
+/// What has to be done before the rest can be told from it.
+const LEAST_SHARE: f64 = 2e-3;
 
 /// Until when a solve goes on.
 #[derive(Clone, Copy, Debug)]
@@ -203,7 +205,9 @@ impl FrameProgress {
         let left = seconds * (1.0 / share.max(1e-9) - 1.0);
         let left = HumanDuration(Duration::from_secs_f64(left.min(1e9)));
         let which = if self.total > 1 { format!(" {} of {}", self.done + 1, self.total) } else { String::new() };
-        self.shown.tell(share, format!("{}{which}  {left} left", self.what));
+        // Of next to nothing, nobody can tell.
+        let left = if share > LEAST_SHARE { format!("  {left} left") } else { String::new() };
+        self.shown.tell(share, format!("{}{which}{left}", self.what));
         self.last_line = seconds;
     }
 

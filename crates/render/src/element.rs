@@ -11,6 +11,7 @@ use twinray_scene::{PatchId, PatchScene, Rgb};
 use twinray_solve::Solution;
 
 use crate::grid::Grid;
+use crate::vantage::Vantage;
 
 /// Patches below this share of the typical side are pooled,
 const SMALL: f64 = 0.6;
@@ -66,22 +67,22 @@ impl Elements {
         // Greedy within each cube: a patch joins the first pool whose founder it fits.
         let mut founder: HashMap<PatchId, PatchId> = HashMap::new();
         for cube in grid.cubes() {
-            let mut founders: Vec<PatchId> = Vec::new();
+            let mut founders: Vec<(PatchId, Vantage)> = Vec::new();
             for p in cube.iter().map(|&k| small[k as usize]) {
                 let (centre, normal) = places[p.index()];
-                let fits = |f: &&PatchId| {
+                let here = Vantage::new(scene, p, centre, normal);
+                let fits = |(f, there): &&(PatchId, Vantage)| {
                     let (c, n) = places[f.index()];
                     let rise = (centre - c).dot(n).abs().max((centre - c).dot(normal).abs());
-                    // Layers of cloth lie as close as neighbours do: only what sees the founder is of its layer.
-                    let lift = LIFT * typical_size + 0.4 * rise;
                     n.dot(normal) > SAME_NORMAL
                         && rise < SAME_PLANE * typical_size
-                        && std::ptr::eq(scene.material(p), scene.material(**f))
-                        && scene.visible(c + n * lift, n, centre + normal * lift, normal)
+                        && std::ptr::eq(scene.material(p), scene.material(*f))
+                        // Layers of cloth lie as close as neighbours do: only what sees the founder is of its layer.
+                        && there.sees(&here, scene, LIFT * typical_size)
                 };
                 match founders.iter().find(fits) {
-                    Some(&f) => drop(founder.insert(p, f)),
-                    None => founders.push(p),
+                    Some(&(f, _)) => drop(founder.insert(p, f)),
+                    None => founders.push((p, here)),
                 }
             }
         }

@@ -19,6 +19,7 @@ pub mod picture;
 mod reconstruct;
 pub mod reference;
 mod sums;
+mod vantage;
 mod vertex;
 pub mod walk;
 

@@ -13,6 +13,7 @@ use twinray_solve::Solution;
 
 use crate::element::{Element, Elements};
 use crate::grid::Grid;
+use crate::vantage::Vantage;
 
 /// Radius of the kernel over the side of an element: about ten elements share a point.
 const RADIUS: f64 = 1.9;
@@ -22,6 +23,8 @@ const MOST_NEIGHBOURS: usize = 72;
 const SAME_NORMAL: f64 = 0.8;
 /// Rise over run off the tangent plane beyond which surfaces are not the same.
 const SAME_PLANE: f64 = 0.35;
+/// Points are lifted by this share of a typical cell's side before it is asked whether they see each other.
+const LIFT: f64 = 0.03;
 /// A surface closer than this share of a typical cell's side covers a point.
 const TOUCHING: f64 = 0.05;
 /// Points at which a suspicious cell is tested for what covers it.
@@ -38,7 +41,7 @@ const NEIGHBOURS_OF_SLIVER: usize = 8;
 /// if all of it is covered.
 #[derive(Clone, Copy, Debug)]
 struct Part {
-    origin: DVec3,
+    origin: Vantage,
     /// Its share of the cell. What is covered gets no light, and would show as a dark rim: a cell's light is that of all its parts.
     share: f64,
 }
@@ -140,7 +143,10 @@ impl<'a> Reconstruction<'a> {
         let part = match parts.len() {
             0 => None,
             1 => Some(0),
-            _ => parts.iter().position(|p| self.sees(x, n, own, p.origin)),
+            _ => {
+                let here = Vantage::new(self.scene, patch, x, n);
+                parts.iter().position(|p| self.sees(&here, &p.origin))
+            }
         };
         let place = Place { x, n, facet: self.scene.normal(patch) };
         let list = part.map_or(&[][..], |part| &self.neighbours(own)[part]);
@@ -149,7 +155,8 @@ impl<'a> Reconstruction<'a> {
         near.filter(|_| list.len() > ALONE)
             .or_else(|| {
                 let reach = 3.0 * self.radius(self.element(own));
-                let mut list = self.visible_from(x, n, self.same_surface(&place, reach), None);
+                let here = Vantage::new(self.scene, patch, x, n);
+                let mut list = self.visible_from(&here, self.same_surface(&place, reach), None);
                 list.truncate(NEIGHBOURS_OF_SLIVER);
                 self.mean(own, &place, &list, Kernel::Wide(reach))
             })
@@ -177,7 +184,7 @@ impl<'a> Reconstruction<'a> {
             let Part { origin, share } = parts[usize::from(part)];
             let free: f64 = parts.iter().map(|p| p.share).sum();
             let radius = if let Kernel::Wide(reach) = kernel { reach } else { self.radius(element) };
-            let offset = origin - place.x;
+            let offset = origin.point - place.x;
             let distance_squared = offset.length_squared();
             let closeness = 1.0 - distance_squared / (radius * radius);
             if closeness <= 0.0 {
@@ -229,7 +236,7 @@ impl<'a> Reconstruction<'a> {
             let mut near = self.same_surface(&self.place(here), reach);
             near.truncate(MOST_NEIGHBOURS);
             let of = |(k, part): (usize, &Part)| {
-                self.visible_from(part.origin, here.normal, near.clone(), Some((own, k as u8))).into_boxed_slice()
+                self.visible_from(&part.origin, near.clone(), Some((own, k as u8))).into_boxed_slice()
             };
             self.parts(own).iter().enumerate().map(of).collect()
         })
@@ -237,12 +244,12 @@ impl<'a> Reconstruction<'a> {
 
     /// The first part of each element that a point sees, those left out of which too little is free. `own` is the
     /// part that the point belongs to.
-    fn visible_from(&self, x: DVec3, n: DVec3, elements: Vec<u32>, own: Option<Neighbour>) -> Vec<Neighbour> {
+    fn visible_from(&self, from: &Vantage, elements: Vec<u32>, own: Option<Neighbour>) -> Vec<Neighbour> {
         let visible = |other: u32| {
             let parts = self.parts(other);
             let part = match own {
                 Some((element, part)) if element == other => Some(usize::from(part)),
-                _ => parts.iter().position(|p| p.share >= LEAST_SHARE && self.sees(x, n, other, p.origin)),
+                _ => parts.iter().position(|p| p.share >= LEAST_SHARE && self.sees(from, &p.origin)),
             };
             part.filter(|&k| parts[k].share >= LEAST_SHARE).map(|k| (other, k as u8))
         };
@@ -273,14 +280,8 @@ impl<'a> Reconstruction<'a> {
         found.into_iter().map(|(_, k)| k).collect()
     }
 
-    /// True if a point over a surface sees a point of an element, both lifted a little: on curved surfaces the chord
-    /// runs below the surface by a part of the rise.
-    fn sees(&self, from: DVec3, normal: DVec3, other: u32, to: DVec3) -> bool {
-        let there = self.element(other).normal;
-        let offset = to - from;
-        let rise = offset.dot(normal).abs().max(offset.dot(there).abs());
-        let lift = 0.03 * self.surfaces.elements.typical_size + 0.4 * rise;
-        self.scene.visible(from + normal * lift, normal, to + there * lift, there)
+    fn sees(&self, from: &Vantage, to: &Vantage) -> bool {
+        from.sees(to, self.scene, LIFT * self.surfaces.elements.typical_size)
     }
 
     /// The free parts of an element, judged by the patch that stands for it.
@@ -291,25 +292,31 @@ impl<'a> Reconstruction<'a> {
             let mut witnesses = self.same_surface(&self.place(here), RADIUS * self.surfaces.elements.typical_size);
             witnesses.retain(|&w| w != element);
             witnesses.truncate(8);
-            let seen = witnesses.iter().filter(|&&w| self.sees(centre, normal, w, self.element(w).centre)).count();
+            let vantage = |p: DVec3| Vantage::new(self.scene, patch, p, normal);
+            let middle = vantage(centre);
+            let witness = |&&w: &&u32| {
+                let there = self.element(w);
+                self.sees(&middle, &Vantage::new(self.scene, there.patch, there.centre, there.normal))
+            };
+            let seen = witnesses.iter().filter(witness).count();
             let mut corners = (1..=4).map(|k| self.spread_point(patch, k));
             let touching = TOUCHING * self.surfaces.elements.typical_size;
             let free = |p: DVec3| !self.scene.is_covered(patch, p, touching);
             if free(centre)
                 && seen * 6 >= witnesses.len() * 5
-                && corners.all(|c| free(c) && self.sees(centre, normal, element, c))
+                && corners.all(|c| free(c) && self.sees(&middle, &vantage(c)))
             {
-                return Box::new([Part { origin: centre, share: 1.0 }]);
+                return Box::new([Part { origin: middle, share: 1.0 }]);
             }
             // Something stands on the cell: gather its free points into parts that see each other.
-            let mut points: Vec<DVec3> =
-                (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).filter(|&p| free(p)).collect();
+            let mut points: Vec<Vantage> =
+                (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).filter(|&p| free(p)).map(vantage).collect();
             let mut parts = Vec::new();
             while let Some(&first) = points.first() {
-                let (group, rest): (Vec<DVec3>, Vec<DVec3>) =
-                    points.iter().partition(|&&p| p == first || self.sees(first, normal, element, p));
-                let middle = group.iter().sum::<DVec3>() / group.len() as f64;
-                let from_middle = |p: &DVec3| p.distance_squared(middle);
+                let (group, rest): (Vec<Vantage>, Vec<Vantage>) =
+                    points.iter().partition(|p| p.point == first.point || self.sees(&first, p));
+                let middle = group.iter().map(|p| p.point).sum::<DVec3>() / group.len() as f64;
+                let from_middle = |p: &Vantage| p.point.distance_squared(middle);
                 let origin = group.iter().copied().min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)));
                 let share = group.len() as f64 / f64::from(COVER_TESTS);
                 parts.push(Part { origin: origin.unwrap_or(first), share });

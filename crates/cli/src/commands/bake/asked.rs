@@ -44,8 +44,9 @@ pub fn check(args: &BakeArgs, carrier: CarrierArg, path: &Path) -> anyhow::Resul
     if carrier == CarrierArg::Probes && engine == Some(EngineArg::Unlit) {
         bail!("--to probes --for unlit: probes light what has no light of its own: leave one of the two out");
     }
-    if carrier == CarrierArg::Probes && engine == Some(EngineArg::Bevy) && extension(path) != "ktx2" {
-        bail!("{}: Bevy reads probes from files that end in .ktx2", path.display());
+    let for_bevy = extension(path) == "ktx2";
+    if carrier == CarrierArg::Probes && engine.is_some_and(|e| (e == EngineArg::Bevy) != for_bevy) {
+        bail!("{}: probes for Bevy, and those alone, are in files that end in .ktx2", path.display());
     }
     // An option that would change nothing is a misunderstanding.
     let is_high = args.quality == Some(QualityArg::High) && carrier != CarrierArg::Probes;
@@ -111,6 +112,11 @@ pub fn check_scene(args: &BakeArgs, loaded: &Loaded, path: &Path) -> anyhow::Res
 /// SCENE-lit.glb in this folder, or SCENE-probes with the ending that the engine reads.
 pub fn default_output(scene: &str, carrier: CarrierArg, engine: Option<EngineArg>) -> PathBuf {
     let stem = Path::new(scene).file_stem().map_or_else(|| scene.to_owned(), |s| s.to_string_lossy().into_owned());
+    // Light that was kept has the name of what it is for.
+    let stem = ["-lit", "-probes"]
+        .iter()
+        .find_map(|end| stem.strip_suffix(end).filter(|_| stored::is_solution(scene)))
+        .unwrap_or(&stem);
     PathBuf::from(match carrier {
         CarrierArg::Probes => format!("{stem}-probes.{}", probes::kind_for(engine)),
         _ => format!("{stem}-lit.glb"),

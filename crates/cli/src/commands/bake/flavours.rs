@@ -53,22 +53,38 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
     dressed
 }
 
-/// Says which pages of an earlier and larger bake lie beside those that were written.
-pub fn left_over(files: &[(PathBuf, Vec<u8>)]) -> Option<String> {
-    let (last, _) = files.last()?;
-    let name = last.file_stem()?.to_string_lossy().into_owned();
-    let (stem, number) = name.rsplit_once('-')?;
-    let number: usize = number.parse().ok()?;
-    let kind = last.extension()?.to_string_lossy().into_owned();
-    let later = |k: usize| last.with_file_name(format!("{stem}-{k}.{kind}"));
-    let count = (number + 1..).take_while(|&k| later(k).is_file()).count();
-    let first = later(number + 1).display().to_string();
-    match count {
-        0 => None,
-        1 => Some(format!("{first}: is of an earlier bake; nothing refers to it any more")),
-        _ => Some(format!(
-            "{first} to {}: are of an earlier bake; nothing refers to them any more",
-            later(number + count).display()
+/// The first page that will lie beside the document.
+pub fn first_beside(engine: EngineArg, output: &Path) -> Option<PathBuf> {
+    let kind = match engine {
+        EngineArg::Three | EngineArg::Unlit => return None,
+        EngineArg::Bevy => "ktx2",
+        EngineArg::Godot => "exr",
+    };
+    let stem = output.file_stem()?.to_string_lossy().into_owned();
+    Some(output.with_file_name(format!("{stem}-0.{kind}")))
+}
+
+/// Says which files beside the document have names of pages, and are none of those that were written.
+pub fn left_over(output: &Path, files: &[(PathBuf, Vec<u8>)]) -> Option<String> {
+    let stem = format!("{}-", output.file_stem()?.to_string_lossy());
+    let is_page = |name: &str| {
+        let (number, kind) = name.strip_prefix(&stem)?.split_once('.')?;
+        let number: usize = number.parse().ok()?;
+        ["ktx2", "exr"].contains(&kind).then_some((number, name.to_owned()))
+    };
+    let folder = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let names = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut found: Vec<_> = names.filter_map(|name| is_page(&name)).collect();
+    found.retain(|(_, name)| {
+        files.iter().all(|(path, _)| path.file_name().is_none_or(|n| n.to_string_lossy() != *name))
+    });
+    found.sort();
+    match found.as_slice() {
+        [] => None,
+        [(_, one)] => Some(format!("{one}: is no page of this bake, though it has the name of one")),
+        [(_, first), .., (_, last)] => Some(format!(
+            "{first} to {last} ({}): are no pages of this bake, though they have names of some",
+            found.len()
         )),
     }
 }

@@ -52,10 +52,11 @@ pub fn end(
     let said = match &kept {
         Some(Ok(path)) => format!("{}: the light, which `twinray bake` takes in place of its scene", path.display()),
         Some(Err(error)) => format!("the light could not be kept: {error:#}"),
-        None if is_stopped => format!("{}: has its light as before", loaded.name),
+        None if is_stopped => format!("{}: has its light as before", args.scene),
         None => String::new(),
     };
-    if !said.is_empty() && !args.quiet {
+    // However quiet: a signal has an answer, and light that is lost is an error.
+    if !said.is_empty() {
         crate::say!("{said}");
     }
     if !is_stopped {

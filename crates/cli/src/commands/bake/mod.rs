@@ -36,6 +36,10 @@ const TOLERATED_ERROR: f64 = 0.1;
 /// Rays of a texel, and texels around a chart, where the user does not say.
 const TEXEL_RAYS: u32 = 256;
 const PADDING: u32 = 2;
+/// The share of a page that is used below which the user is warned.
+const LITTLE: f64 = 0.1;
+/// How far light at vertices may be off before the user is warned.
+const COARSE: f64 = 0.25;
 /// Side of a page where the user does not say, with a density and without.
 const PAGE: [u32; 2] = [2048, 1024];
 
@@ -56,6 +60,11 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
     let Some(scene) = loaded.scene.take() else { unreachable!("it was asked for") };
     asked::check_scene(args, &loaded, &path)?;
     let mut output = Output::open(&path)?;
+    if let Some(first) =
+        flavours::first_beside(args.engine.unwrap_or_default(), &path).filter(|_| carrier == CarrierArg::Lightmap)
+    {
+        drop(Output::open(&first)?);
+    }
     let mut warnings = loaded.warnings.clone();
     let mut warn = |new: Vec<String>| {
         commands::print_warnings(&new, quiet);
@@ -107,8 +116,10 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
         if interrupt::requested() { Err(Cancelled) } else { Ok(()) }
     };
     let finished = job.bake(&mut watch).and_then(|finished| {
-        for (path, bytes) in &finished.files {
-            Output::open(path)?.write(bytes)?;
+        // All places are there before the first is filled.
+        let places = finished.files.iter().map(|(path, _)| Output::open(path)).collect::<anyhow::Result<Vec<_>>>()?;
+        for (place, (_, bytes)) in places.into_iter().zip(&finished.files) {
+            place.write(bytes)?;
         }
         output.put(|out| out.write_all(&finished.bytes))?;
         Ok(finished)
@@ -122,7 +133,12 @@ pub fn run(args: &BakeArgs) -> anyhow::Result<Ending> {
         }
     };
     warn(new);
-    warn(flavours::left_over(&files).into_iter().collect());
+    if carrier == CarrierArg::Lightmap {
+        warn(flavours::left_over(&path, &files).into_iter().collect());
+    }
+    if interrupt::requested() {
+        crate::say!("it was done before it could be stopped, and is written");
+    }
 
     if !quiet {
         words.iter().for_each(|line| crate::say!("{line}"));
@@ -162,6 +178,7 @@ struct Baked {
     /// For the report.
     facts: Value,
     words: Vec<String>,
+    warnings: Vec<String>,
 }
 
 /// What is baked into what.
@@ -191,7 +208,7 @@ impl Job<'_> {
     fn bake(&self, watch: &mut Watch<'_>) -> anyhow::Result<Finished> {
         let Self { args, loaded, solution, path, .. } = *self;
         let Some(document) = &self.document else {
-            let (bytes, facts, line) = probes::bake(args, loaded, solution, path, watch)?;
+            let (bytes, facts, line) = probes::bake(args, loaded, solution, self.seed, path, watch)?;
             let about = self.about(&facts);
             return Ok(Finished { bytes, files: Vec::new(), about, words: vec![line], warnings: Vec::new() });
         };
@@ -199,11 +216,12 @@ impl Job<'_> {
             AtlasError::Cancelled(stopped) => anyhow::Error::new(stopped),
             other => anyhow!("{}: {other}", args.load.scene),
         })?;
-        let Baked { surfaces, pages, files, facts, words } = baked;
+        let Baked { surfaces, pages, files, facts, words, warnings: mut told } = baked;
         let about = self.about(&facts);
         let lit = Lit { surfaces, pages, drop_lights: !args.keep_lights, about: about.clone() };
         let LitGlb { bytes, warnings } = document.lit(&lit, &args.load.read)?;
-        Ok(Finished { bytes, files, about, words, warnings: warnings.iter().map(ToString::to_string).collect() })
+        told.extend(warnings.iter().map(ToString::to_string));
+        Ok(Finished { bytes, files, about, words, warnings: told })
     }
 
     fn surfaces(&self, watch: &mut Watch<'_>) -> Result<Baked, AtlasError> {
@@ -213,15 +231,14 @@ impl Job<'_> {
             QualityArg::Smooth => Quality::Smooth,
             QualityArg::High => Quality::Gathered(args.texel_rays.unwrap_or(TEXEL_RAYS)),
         };
-        let seed = args.solve.seed.unwrap_or(1);
         if self.carrier == CarrierArg::Vertex {
-            return Ok(of_vertices(&bake::bake_vertices(scene, &loaded.patches, solution, quality, seed, watch)?));
+            return Ok(of_vertices(&bake::bake_vertices(scene, &loaded.patches, solution, quality, self.seed, watch)?));
         }
         let density = args.density.map_or(TexelDensity::OnePage, TexelDensity::PerMetre);
         let page_size = args.page_size.unwrap_or(PAGE[usize::from(args.density.is_none())]);
         let padding = args.padding.unwrap_or(PADDING);
         let atlas = AtlasOptions { density, page_size, padding, keep_authored: !args.unwrap };
-        let options = LightmapOptions { atlas, quality, stitch: !args.no_stitch, seed };
+        let options = LightmapOptions { atlas, quality, stitch: !args.no_stitch, seed: self.seed };
         let map = bake::bake(scene, &loaded.patches, solution, &options, watch)?;
         let mut baked = of_lightmap(&map);
         match args.engine.unwrap_or_default() {
@@ -288,6 +305,13 @@ fn of_lightmap(map: &Lightmap) -> Baked {
         }
     }
     let atlas = &map.atlas;
+    let mut warnings = Vec::new();
+    if atlas.utilization < LITTLE {
+        warnings.push(format!(
+            "{:.0} % of the page carries light, since charts keep their distance: --density, a larger --page-size or fewer charts make it sharper",
+            100.0 * atlas.utilization
+        ));
+    }
     let (source, mut words) = match &atlas.layout {
         Layout::Authored => ("authored", vec!["texture coordinates: the second set of the scene, as it is".to_owned()]),
         Layout::Unwrapped { kept, fault } => {
@@ -320,7 +344,7 @@ fn of_lightmap(map: &Lightmap) -> Baked {
         "charts": atlas.charts, "utilization": atlas.utilization,
         "seams": { "metres": after.length, "rms": after.rms, "p99": after.p99, "rms_before": before.rms },
     });
-    Baked { surfaces, pages: Vec::new(), files: Vec::new(), facts, words }
+    Baked { surfaces, pages: Vec::new(), files: Vec::new(), facts, words, warnings }
 }
 
 fn of_vertices(light: &VertexLight) -> Baked {
@@ -348,7 +372,9 @@ fn of_vertices(light: &VertexLight) -> Baked {
         100.0 * light.off
     )];
     let facts = json!({ "carrier": "vertex", "vertices": vertices, "off": light.off });
-    Baked { surfaces, pages: Vec::new(), files: Vec::new(), facts, words }
+    let coarse = format!("light at vertices is off by {:.0} %: expected finer meshes, or lightmaps", 100.0 * light.off);
+    let warnings = if light.off > COARSE { vec![coarse] } else { Vec::new() };
+    Baked { surfaces, pages: Vec::new(), files: Vec::new(), facts, words, warnings }
 }
 
 fn of_part(part: &Part, page: Option<usize>) -> LitSurface {

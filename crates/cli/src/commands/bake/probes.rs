@@ -35,6 +35,7 @@ pub fn bake(
     args: &BakeArgs,
     loaded: &Loaded,
     solution: &Solution,
+    seed: u64,
     path: &Path,
     watch: &mut Watch<'_>,
 ) -> anyhow::Result<(Vec<u8>, Value, String)> {
@@ -43,7 +44,7 @@ pub fn bake(
         spacing: args.spacing.map_or(ProbeSpacing::Default, ProbeSpacing::Metres),
         rays: args.probe_rays.unwrap_or(RAYS),
         punctual: !args.keep_lights,
-        seed: args.solve.seed.unwrap_or(1),
+        seed,
     };
     let volume = bake_probes(&loaded.patches, solution, &options, watch).map_err(|e| match e {
         ProbeError::Cancelled(stopped) => anyhow::Error::new(stopped),
