@@ -27,6 +27,8 @@ const SAME_PLANE: f64 = 0.35;
 const LIFT: f64 = 0.03;
 /// A surface closer than this share of a typical cell's side covers a point.
 const TOUCHING: f64 = 0.05;
+/// Corners of a cell are tested so far towards its middle.
+const INWARDS: f64 = 0.05;
 /// Points at which a suspicious cell is tested for what covers it.
 const COVER_TESTS: u32 = 24;
 /// Cells of which less than this share is free say too little of their light.
@@ -90,6 +92,17 @@ pub struct Reconstruction<'a> {
     scene: &'a PatchScene,
     solution: &'a Solution,
     surfaces: Surfaces,
+    /// Per element.
+    splits: Vec<OnceLock<Split>>,
+}
+
+/// How the light of an element is divided among its parts.
+#[derive(Debug)]
+struct Split {
+    /// Light of each part over that of the whole element. Times the parts' shares, they add up to 1.
+    factors: Box<[f64]>,
+    /// Whether neighbours told.
+    is_known: bool,
 }
 
 /// What is known of a scene's surfaces whatever their light: it outlives solutions.
@@ -126,7 +139,8 @@ impl<'a> Reconstruction<'a> {
     /// The same where the scene's surfaces are known already. O(K).
     pub fn over(scene: &'a PatchScene, solution: &'a Solution, mut surfaces: Surfaces) -> Self {
         surfaces.elements.light(scene, solution);
-        Self { scene, solution, surfaces }
+        let splits = surfaces.parts.iter().map(|_| OnceLock::new()).collect();
+        Self { scene, solution, surfaces, splits }
     }
 
     /// What has been learnt of the scene's surfaces.
@@ -180,9 +194,9 @@ impl<'a> Reconstruction<'a> {
         let (mut total, mut lobe_total) = (0.0, 0.0);
         for &(other, part) in neighbours {
             let element = self.element(other);
-            let parts = self.parts(other);
-            let Part { origin, share } = parts[usize::from(part)];
-            let free: f64 = parts.iter().map(|p| p.share).sum();
+            let Part { origin, share } = self.parts(other)[usize::from(part)];
+            let split = self.split(other);
+            let factor = split.factors[usize::from(part)];
             let radius = if let Kernel::Wide(reach) = kernel { reach } else { self.radius(element) };
             let offset = origin.point - place.x;
             let distance_squared = offset.length_squared();
@@ -193,18 +207,19 @@ impl<'a> Reconstruction<'a> {
             let rise = place.rise(offset, element.normal) / distance_squared.sqrt().max(1e-12);
             let plane = fade(SAME_PLANE - rise, 0.15);
             let turn = fade(place.n.dot(element.normal) - SAME_NORMAL, 0.5 * (1.0 - SAME_NORMAL));
-            // A cell that is half covered says less, and says it with the error of its share; one in several parts does not say
+            // A cell that is half covered says less, and says it with the error of its share; one in several parts may not say
             // which of them has its light.
-            let trust = element.area * share * share * share * (share / free).powi(2);
+            let doubt = if split.is_known { 1.0 } else { (share * factor).powi(2) };
+            let trust = element.area * share * share * share * doubt;
             let weight = closeness * closeness * plane * turn * trust;
-            sum.irradiance += element.irradiance * (weight / free);
+            sum.irradiance += element.irradiance * (weight * factor);
             total += weight;
             if own.lobe.is_some()
                 && let Some(lobe) = element.lobe
                 && std::ptr::eq(self.scene.material(element.patch), material)
             {
-                sum.lobe[0] += lobe[0] * (weight / free);
-                sum.lobe[1] += lobe[1] * (weight / free);
+                sum.lobe[0] += lobe[0] * (weight * factor);
+                sum.lobe[1] += lobe[1] * (weight * factor);
                 lobe_total += weight;
             }
         }
@@ -284,6 +299,40 @@ impl<'a> Reconstruction<'a> {
         from.sees(to, self.scene, LIFT * self.surfaces.elements.typical_size)
     }
 
+    /// How the light of an element is divided: as that of whole neighbours which its parts see is, so that a cell that passes
+    /// under a wall gives no light of the bright side to the dark one. The light of the element stays what it is.
+    fn split(&self, element: u32) -> &Split {
+        self.splits[element as usize].get_or_init(|| {
+            let parts = self.parts(element);
+            let reach = self.radius(self.element(element)) + 1.2 * self.size(self.element(element));
+            let light = |(k, part): (usize, &Part)| -> Option<f64> {
+                let (mut sum, mut total) = (0.0, 0.0);
+                for &(other, _) in &self.neighbours(element)[k] {
+                    let is_whole = matches!(self.parts(other), [Part { share: 1.0, .. }]);
+                    if other == element || !is_whole {
+                        continue;
+                    }
+                    let there = self.element(other);
+                    let closeness = 1.0 - there.centre.distance_squared(part.origin.point) / (reach * reach);
+                    let weight = there.area * closeness.max(0.0).powi(2);
+                    sum += weight * there.irradiance.luminance().max(0.0);
+                    total += weight;
+                }
+                (total > 0.0).then(|| sum / total)
+            };
+            let free: f64 = parts.iter().map(|p| p.share).sum();
+            let found: Option<Vec<f64>> =
+                if parts.len() > 1 { parts.iter().enumerate().map(light).collect() } else { None };
+            let whole = |found: &[f64]| parts.iter().zip(found).map(|(p, l)| p.share * l).sum::<f64>();
+            match found.map(|found| (whole(&found), found)) {
+                Some((whole, found)) if whole > 0.0 => {
+                    Split { factors: found.iter().map(|l| l / whole).collect(), is_known: true }
+                }
+                _ => Split { factors: parts.iter().map(|_| 1.0 / free).collect(), is_known: false },
+            }
+        })
+    }
+
     /// The free parts of an element, judged by the patch that stands for it.
     fn parts(&self, element: u32) -> &[Part] {
         self.surfaces.parts[element as usize].get_or_init(|| {
@@ -299,18 +348,20 @@ impl<'a> Reconstruction<'a> {
                 self.sees(&middle, &Vantage::new(self.scene, there.patch, there.centre, there.normal))
             };
             let seen = witnesses.iter().filter(witness).count();
-            let mut corners = (1..=4).map(|k| self.spread_point(patch, k));
+            // A corner may lie beyond a wall, and have much light while the rest has none.
+            let corners = self.scene.cell_corners(patch).into_iter().map(|c| c.lerp(centre, INWARDS));
+            let places: Vec<DVec3> = (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).chain(corners).collect();
+            let mut outer = places[1..=4].iter().chain(&places[COVER_TESTS as usize..]);
             let touching = TOUCHING * self.surfaces.elements.typical_size;
             let free = |p: DVec3| !self.scene.is_covered(patch, p, touching);
             if free(centre)
                 && seen * 6 >= witnesses.len() * 5
-                && corners.all(|c| free(c) && self.sees(&middle, &vantage(c)))
+                && outer.all(|&p| free(p) && self.sees(&middle, &vantage(p)))
             {
                 return Box::new([Part { origin: middle, share: 1.0 }]);
             }
             // Something stands on the cell: gather its free points into parts that see each other.
-            let mut points: Vec<Vantage> =
-                (0..COVER_TESTS).map(|k| self.spread_point(patch, k)).filter(|&p| free(p)).map(vantage).collect();
+            let mut points: Vec<Vantage> = places.iter().copied().filter(|&p| free(p)).map(vantage).collect();
             let mut parts = Vec::new();
             while let Some(&first) = points.first() {
                 let (group, rest): (Vec<Vantage>, Vec<Vantage>) =
@@ -318,7 +369,7 @@ impl<'a> Reconstruction<'a> {
                 let middle = group.iter().map(|p| p.point).sum::<DVec3>() / group.len() as f64;
                 let from_middle = |p: &Vantage| p.point.distance_squared(middle);
                 let origin = group.iter().copied().min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)));
-                let share = group.len() as f64 / f64::from(COVER_TESTS);
+                let share = group.len() as f64 / places.len() as f64;
                 parts.push(Part { origin: origin.unwrap_or(first), share });
                 points = rest;
             }

@@ -126,7 +126,7 @@ impl PatchScene {
     }
 
     #[inline]
-    fn closest(&self, origin: DVec3, direction: DVec3, skip: u32) -> Option<SurfaceHit> {
+    pub(crate) fn closest(&self, origin: DVec3, direction: DVec3, skip: u32) -> Option<SurfaceHit> {
         let ray = kernel_ray(origin, direction, skip);
         let hit = if self.holes {
             self.kernel.closest_hit_where(&ray, |h| self.accept(h))

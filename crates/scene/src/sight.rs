@@ -20,6 +20,8 @@ const PARALLEL: f64 = 1.0 - 1e-9;
 const MOST_PANES: u32 = 16;
 /// The share of the way to the middle of its cell by which a point is moved before it is asked whether something covers it.
 const INWARDS: f64 = 0.01;
+/// Share of the scene's radius within which two surfaces are in the same place.
+const SAME_PLACE: f64 = 1e-5;
 /// Directions, all 60° from the normal, in which a point within a body has to meet the body's inside.
 const OBLIQUE: u32 = 6;
 
@@ -60,24 +62,32 @@ impl PatchScene {
         let normal = self.normal(patch);
         // On an edge, a ray would pass between the faces of a body that meet there.
         let point = point.lerp(self.cell_centre(patch), INWARDS);
-        let Some(above) = self.trace_from(patch, point, normal) else { return false };
-        if above.t < touching {
-            return true;
-        }
         let (a, b) = normal.any_orthonormal_pair();
-        let mut oblique = (0..OBLIQUE).map(|k| {
+        let oblique = |k: u32| {
             let (sin, cos) = (TAU * f64::from(k) / f64::from(OBLIQUE)).sin_cos();
             0.5 * normal + 0.75_f64.sqrt() * (cos * a + sin * b)
-        });
-        self.absorbs(&above)
-            && oblique.all(|towards| {
-                let met = self.trace_from(patch, point, towards);
-                met.is_some_and(|met| met.t < touching || self.absorbs(&met))
-            })
+        };
+        match self.trace_from(patch, point, normal) {
+            None => false,
+            Some(above) if above.t < touching => true,
+            Some(above) => {
+                self.is_inside(patch, point, normal, &above)
+                    && (0..OBLIQUE).map(oblique).all(|towards| {
+                        let met = self.trace_from(patch, point, towards);
+                        met.is_some_and(|met| met.t < touching || self.is_inside(patch, point, towards, &met))
+                    })
+            }
+        }
     }
 
-    fn absorbs(&self, hit: &SurfaceHit) -> bool {
-        hit.side == Side::Back && self.patch_of(hit).is_none()
+    /// True if what a ray met is the absorbing inside of a body. A body may end in the plane of another's front, as a wall does
+    /// at a ceiling, and a ray from within meet either first.
+    fn is_inside(&self, patch: PatchId, point: DVec3, towards: DVec3, met: &SurfaceHit) -> bool {
+        let absorbs = |hit: &SurfaceHit| hit.side == Side::Back && self.patch_of(hit).is_none();
+        absorbs(met)
+            || self
+                .closest(self.lifted(point, self.normal(patch)), towards, met.triangle)
+                .is_some_and(|other| absorbs(&other) && (other.t - met.t).abs() < SAME_PLACE * self.radius())
     }
 
     /// What panes let through up to parameter `end` of a ray whose first hit is known.

@@ -216,6 +216,36 @@ fn cells_between_slats_keep_their_light() {
     assert!((0.96 * found / arrived - 1.0).abs() < 0.03, "{found} against {arrived}");
 }
 
+/// A partition that stands in the middle of cells of a floor that runs on under it keeps light on its side.
+#[test]
+fn light_stays_on_its_side_of_a_partition() {
+    let mut hall = Boxes::new();
+    let (grey, lamp, black) = (hall.material(0.5, 0.0), hall.material(0.0, 20.0), hall.material(0.0, 0.0));
+    hall.add([-2.0, 0.0, -1.0], [2.0, 2.0, 1.0], grey, true);
+    hall.add([0.02, 0.0, -1.0], [0.04, 2.0, 1.0], black, false);
+    hall.add([-1.2, 1.8, -0.2], [-0.8, 1.9, 0.2], lamp, false);
+    let patches = cut(&hall.0, 0.1);
+    let solution = solve(&patches, 4_000_000);
+    let smooth = SurfaceLight::new(&patches, &solution, Quality::Smooth, 1);
+    let cells = SurfaceLight::new(&patches, &solution, Quality::Cells, 1);
+    let mean = |light: &SurfaceLight<'_>, x: f64| {
+        let at = |k: i32| {
+            let above = DVec3::new(x, 0.001, -0.8 + 0.04 * f64::from(k)) - patches.centre();
+            let hit = patches.trace(above, DVec3::NEG_Y).expect("the floor");
+            light.at(hit.triangle, hit.side, [hit.u, hit.v], 7, 0..1).expect("light").luminance()
+        };
+        (0..40).map(at).sum::<f64>() / 40.0
+    };
+    let bright = mean(&cells, -0.15);
+    // The cells under the partition are bright on both sides of it.
+    assert!(mean(&cells, 0.06) > 0.1 * bright);
+    for x in [0.045, 0.06, 0.1, 0.2] {
+        assert!(mean(&smooth, x) < 0.003 * bright, "{x}: {} of {bright}", mean(&smooth, x));
+    }
+    // Nor do they leave a dark rim where they are bright.
+    assert!((mean(&smooth, 0.01) / bright - 1.0).abs() < 0.1, "{} of {bright}", mean(&smooth, 0.01));
+}
+
 /// A sheet that is lit on both sides has both lights.
 #[test]
 fn sheets_have_two_sides() {
