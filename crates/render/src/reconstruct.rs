@@ -2,8 +2,9 @@
 //!
 //! At a point x, irradiance is a weighted mean over nearby elements of the same surface: a compact kernel of the
 //! distance, times area and visible share, faded out where normals turn or a step leads off the tangent plane. Only
-//! elements that the point's own can see take part, so that nothing passes a wall. The weights vary continuously
-//! with x: no facets. Elements are looked at when a pixel first needs them.
+//! elements that the point's own can see take part, so that nothing passes a wall; an element that passes under a wall divides
+//! its light as its whole neighbours on either side have it. The weights vary continuously with x: no facets. Elements are
+//! looked at when a pixel first needs them.
 
 use std::sync::OnceLock;
 

@@ -55,8 +55,8 @@ impl PatchScene {
         self.through_panes(point, towards, hit, f64::INFINITY)
     }
 
-    /// True if nothing can light a point of `patch`: along the normal it meets something within `touching`, or it lies within a
-    /// body, whose absorbing inside it meets in all directions that are tried. An absorbing back above it alone, as that of a
+    /// True if nothing can light a point of `patch`: along the normal it meets something within `touching` metres, or it lies
+    /// within a body, whose absorbing inside it meets in all directions that are tried. An absorbing back above it alone, as that of a
     /// leaf, leaves light a way from the side.
     pub fn is_covered(&self, patch: PatchId, point: DVec3, touching: f64) -> bool {
         let normal = self.normal(patch);

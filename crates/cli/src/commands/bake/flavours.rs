@@ -17,6 +17,10 @@ const CLIPPED: f64 = 1e-3;
 const LARGEST: f32 = 65_000.0;
 const SOFTWARE: [(&str, &str); 1] = [("Software", concat!("twinray ", env!("CARGO_PKG_VERSION")))];
 
+/// Kinds of files beside the document.
+const KTX2: &str = "ktx2";
+const EXR: &str = "exr";
+
 /// Pages for the document, and files beside it.
 pub struct Dressed {
     pub pages: Vec<LitPage>,
@@ -26,7 +30,6 @@ pub struct Dressed {
 /// Lightmaps of irradiance for an engine; `output` is the document's place.
 pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
     let mut dressed = Dressed { pages: Vec::new(), files: Vec::new() };
-    let stem = output.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     for (k, page) in map.pages.iter().enumerate() {
         let name = format!("lightmap {k}");
         let (scaled, extension, quantity) = match engine {
@@ -35,8 +38,8 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
                 dressed.pages.push(LitPage { name, material });
                 continue;
             }
-            EngineArg::Bevy => (1.0 / PI, "ktx2", "irradiance/π"),
-            EngineArg::Godot => (1.0, "exr", "irradiance"),
+            EngineArg::Bevy => (1.0 / PI, KTX2, "irradiance/π"),
+            EngineArg::Godot => (1.0, EXR, "irradiance"),
         };
         let pixels: Vec<[f32; 3]> = page.irradiance.iter().map(|p| p.map(|c| (f64::from(c) * scaled) as f32)).collect();
         let bytes = match engine {
@@ -45,9 +48,10 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
             }
             _ => format::write_exr(page.width, page.height, &pixels, Some(1.0), &[("software", SOFTWARE[0].1)]),
         };
-        let uri = format!("{stem}-{k}.{extension}");
+        let place = beside(output, k, extension);
+        let uri = place.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let about = json!({ "uri": uri, "page": k, "texCoord": 1, "quantity": quantity });
-        dressed.files.push((output.with_file_name(&uri), bytes));
+        dressed.files.push((place, bytes));
         dressed.pages.push(LitPage { name, material: LitMaterial::Beside(about) });
     }
     dressed
@@ -55,13 +59,17 @@ pub fn lightmaps(map: &Lightmap, engine: EngineArg, output: &Path) -> Dressed {
 
 /// The first page that will lie beside the document.
 pub fn first_beside(engine: EngineArg, output: &Path) -> Option<PathBuf> {
-    let kind = match engine {
-        EngineArg::Three | EngineArg::Unlit => return None,
-        EngineArg::Bevy => "ktx2",
-        EngineArg::Godot => "exr",
-    };
-    let stem = output.file_stem()?.to_string_lossy().into_owned();
-    Some(output.with_file_name(format!("{stem}-0.{kind}")))
+    match engine {
+        EngineArg::Three | EngineArg::Unlit => None,
+        EngineArg::Bevy => Some(beside(output, 0, KTX2)),
+        EngineArg::Godot => Some(beside(output, 0, EXR)),
+    }
+}
+
+/// The place of a page beside the document.
+fn beside(output: &Path, page: usize, kind: &str) -> PathBuf {
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    output.with_file_name(format!("{stem}-{page}.{kind}"))
 }
 
 /// Says which files beside the document have names of pages, and are none of those that were written.
@@ -70,7 +78,7 @@ pub fn left_over(output: &Path, files: &[(PathBuf, Vec<u8>)]) -> Option<String> 
     let is_page = |name: &str| {
         let (number, kind) = name.strip_prefix(&stem)?.split_once('.')?;
         let number: usize = number.parse().ok()?;
-        ["ktx2", "exr"].contains(&kind).then_some((number, name.to_owned()))
+        [KTX2, EXR].contains(&kind).then_some((number, name.to_owned()))
     };
     let folder = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let names = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
